@@ -1,0 +1,281 @@
+"""`Foam`: a cell network laid out in a Hele-Shaw cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpedfoam.arrays import Floats, Ints, as_floats, as_indices, as_integer, as_number, as_points, frozen
+from warpedfoam.cell import HeleShawCell
+from warpedfoam.errors import TopologyError
+from warpedfoam.kernels.quadrature import gauss
+from warpedfoam.network import CellNetwork, network_from_loops
+from warpedfoam.surfaces.protocol import Layer
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+@dataclass(frozen=True, eq=False)
+class Foam:
+    """A foam one bubble thick: topology, vertex positions, film shapes and the volumes to hold.
+
+    A film of order p is a polynomial arc over the segment between its end vertices, with a
+    transverse offset (in units of the segment) at each of its p − 1 interior Gauss–Lobatto nodes,
+    positive to the left. Through the gap it is ruled by the surface's normals.
+
+    Parameters
+    ----------
+    cell : HeleShawCell
+    network : CellNetwork
+        Of the same Euler characteristic as the surface.
+    vertex_points : (n_vertices, 3) array
+        On the surface, to 1e-9 of its size.
+    film_offsets : (n_films, p − 1) array, optional
+        Straight films of order 4 by default.
+    target_volumes : (n_bubbles,) array, optional
+        Above 0, adding up to the cell's volume; the present volumes by default.
+    bubble_ids : (n_bubbles,) integer array, optional
+        Names that stay with the bubbles; 0 … n − 1 by default.
+    tension : float, optional
+        γ, energy per film area, both faces included.
+    pressures : (n_bubbles,) array, optional
+        Pressures found by `warpedfoam.relax`.
+    seed : int, optional
+        The random seed that the foam came from.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Wrong types, shapes, or values that contradict each other.
+    TopologyError
+        If the network's Euler characteristic is not the surface's.
+    """
+
+    cell: HeleShawCell
+    network: CellNetwork
+    vertex_points: Floats
+    film_offsets: Floats
+    target_volumes: Floats
+    bubble_ids: Ints
+    tension: float
+    pressures: Floats | None
+    seed: int | None
+
+    def __init__(
+        self,
+        cell: HeleShawCell,
+        network: CellNetwork,
+        vertex_points: ArrayLike,
+        film_offsets: ArrayLike | None = None,
+        target_volumes: ArrayLike | None = None,
+        bubble_ids: ArrayLike | None = None,
+        tension: float = 1.0,
+        pressures: ArrayLike | None = None,
+        seed: int | None = None,
+    ) -> None:
+        if not isinstance(cell, HeleShawCell):
+            raise TypeError(f"cell must be a HeleShawCell, got {type(cell).__name__}")
+        if not isinstance(network, CellNetwork):
+            raise TypeError(f"network must be a CellNetwork, got {type(network).__name__}")
+        put = object.__setattr__
+        put(self, "cell", cell)
+        put(self, "network", network)
+        put(self, "tension", as_number(tension, "tension", positive=True))
+        put(self, "seed", None if seed is None else as_integer(seed, "seed", minimum=0))
+        chi = cell.surface.euler_characteristic
+        if network.euler_characteristic != chi:
+            raise TopologyError(
+                f"the network has Euler characteristic {network.euler_characteristic}, its surface {chi}"
+            )
+        points = as_points(vertex_points, "vertex_points")
+        if len(points) != network.n_vertices:
+            raise ValueError(
+                f"vertex_points must hold {network.n_vertices} points, one per vertex, got {len(points)}"
+            )
+        size = cell.surface.size
+        away = np.linalg.norm(cell.surface.project(points) - points, axis=1)
+        if away.max() > 1e-9 * size:
+            raise ValueError(
+                f"vertex_points must lie on the surface, but vertex {int(away.argmax())} is {away.max():g} "
+                "away; project them first (cell.surface.project)"
+            )
+        put(self, "vertex_points", frozen(points))
+        if film_offsets is None:
+            film_offsets = np.zeros((network.n_films, 3))
+        offsets = as_floats(film_offsets, "film_offsets", (network.n_films, None))
+        put(self, "film_offsets", frozen(offsets))
+        if target_volumes is None:
+            targets = self.bubble_volumes
+        else:
+            targets = as_floats(target_volumes, "target_volumes", (network.n_bubbles,))
+        if (targets <= 0.0).any():
+            bad = int(np.argmin(targets))
+            raise ValueError(f"target_volumes must be above 0, but bubble {bad} has {targets[bad]:g}")
+        if abs(targets.sum() - cell.volume) > 1e-9 * cell.volume:
+            raise ValueError(
+                f"target_volumes must add up to the cell's volume {cell.volume:.12g}, got {targets.sum():.12g}; "
+                "scale them by the ratio"
+            )
+        put(self, "target_volumes", frozen(targets))
+        if bubble_ids is None:
+            bubble_ids = np.arange(network.n_bubbles)
+        ids = as_indices(bubble_ids, "bubble_ids", (network.n_bubbles,))
+        if len(np.unique(ids)) != len(ids):
+            raise ValueError("bubble_ids must differ from each other")
+        put(self, "bubble_ids", frozen(ids))
+        if pressures is not None:
+            pressures = frozen(as_floats(pressures, "pressures", (network.n_bubbles,)))
+        put(self, "pressures", pressures)
+
+    @classmethod
+    def from_loops(
+        cls,
+        cell: HeleShawCell,
+        vertex_points: ArrayLike,
+        loops: Sequence[Sequence[int]],
+        *,
+        order: int = 4,
+        target_volumes: ArrayLike | None = None,
+    ) -> Foam:
+        """Foam of bubbles given as counter-clockwise loops of vertices; points are projected.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from warpedfoam import HeleShawCell, Sphere
+        >>> points = np.array([[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]])
+        >>> loops = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+        >>> foam = Foam.from_loops(HeleShawCell(Sphere(1.0), gap=0.01), points, loops)
+        >>> round(float(foam.film_lengths.sum()), 8)
+        11.46379942
+        """
+        network = network_from_loops(loops)
+        points = cell.surface.project(as_points(vertex_points, "vertex_points"))
+        n = as_integer(order, "order", minimum=1) - 1
+        return cls(cell, network, points, np.zeros((network.n_films, n)), target_volumes)
+
+    @property
+    def order(self) -> int:
+        """p, the polynomial order of the films."""
+        return self.film_offsets.shape[1] + 1
+
+    @property
+    def n_bubbles(self) -> int:
+        """Number of bubbles."""
+        return self.network.n_bubbles
+
+    @property
+    def bubble_size(self) -> float:
+        """ℓ = sqrt(area of the surface / number of bubbles), the foam's unit of length."""
+        return float(np.sqrt(self.cell.surface.area / self.n_bubbles))
+
+    @property
+    def film_ends(self) -> tuple[Floats, Floats]:
+        """Points where each film starts and ends, two (n_films, 3) arrays."""
+        return self.vertex_points[self.network.tails], self.vertex_points[self.network.heads]
+
+    @cached_property
+    def film_areas(self) -> Floats:
+        """Area of each ruled film, ∫₀ᵈ∫ |(I + tW)T| ds dt, (n_films,)."""
+        return self._measure(self.cell.layer)
+
+    @cached_property
+    def film_lengths(self) -> Floats:
+        """Length of each film on the inner plate, (n_films,)."""
+        return self._measure(Layer.surface())
+
+    @property
+    def energy(self) -> float:
+        """E = γ Σ film areas."""
+        return self.tension * float(self.film_areas.sum())
+
+    @cached_property
+    def bubble_volumes(self) -> Floats:
+        """Steiner volume of each bubble, ∫ (d + H d² + G d³/3) dA, (n_bubbles,)."""
+        return self._inside(self.cell.layer)
+
+    @cached_property
+    def bubble_areas(self) -> Floats:
+        """Area of each bubble on the inner plate, (n_bubbles,)."""
+        return self._inside(Layer.surface())
+
+    @cached_property
+    def bubble_curvatures(self) -> Floats:
+        """Integrated Gaussian curvature ∫ G dA of each bubble, (n_bubbles,)."""
+        return self._inside(Layer.curvature())
+
+    @cached_property
+    def bubble_centres(self) -> Floats:
+        """Mean point of each bubble's boundary, projected on the surface, (n_bubbles, 3)."""
+        nodes, weights = gauss(3)
+        points = np.einsum("q,fqx->fx", weights, self.film_curves_at(nodes))
+        lengths, halves = self.film_lengths, self.network.loops.halves
+        film, owner = halves >> 1, self.network.bubble[halves]
+        weight = lengths[film]
+        total = np.bincount(owner, weight, minlength=self.n_bubbles)
+        mean = np.stack(
+            [np.bincount(owner, weight * points[film, k], minlength=self.n_bubbles) for k in range(3)],
+            axis=1,
+        )
+        return frozen(self.cell.surface.project(mean / total[:, None]))
+
+    def film_curves(self, k: int = 16) -> Floats:
+        """``k`` points along each film, ends included, for drawing: (n_films, k, 3).
+
+        Raises
+        ------
+        TypeError, ValueError
+            If ``k`` is not an integer of at least 2.
+        """
+        return self.film_curves_at(np.linspace(0.0, 1.0, as_integer(k, "k", minimum=2)))
+
+    def film_curves_at(self, xi: Floats) -> Floats:
+        """Points of each film at parameters ``xi`` (m,) in [0, 1]: (n_films, m, 3)."""
+        tail, head = self.film_ends
+        return self.cell.surface.arc_points(tail, head, self.film_offsets, xi)
+
+    def with_order(self, order: int) -> Foam:
+        """The same foam with films of another order, their shapes interpolated."""
+        from warpedfoam.kernels.quadrature import lobatto
+
+        p = as_integer(order, "order", minimum=1, maximum=40)
+        if p == self.order:
+            return self
+        old, new = lobatto(self.order), lobatto(p)
+        values = old.interpolation(new.nodes[1:-1])[:, 1:-1]
+        return replace(self, film_offsets=self.film_offsets @ values.T)
+
+    def to_networkx(self) -> nx.MultiGraph:
+        """Dual multigraph with the bubbles' scalars (id, area, volume, pressure, position) on the nodes."""
+        graph = self.network.to_networkx()
+        columns = {
+            "id": self.bubble_ids.tolist(),
+            "area": self.bubble_areas.tolist(),
+            "volume": self.bubble_volumes.tolist(),
+            **{axis: self.bubble_centres[:, k].tolist() for k, axis in enumerate("xyz")},
+        }
+        if self.pressures is not None:
+            columns["pressure"] = self.pressures.tolist()
+        for name, values in columns.items():
+            for node, value in enumerate(values):
+                graph.nodes[node][name] = value
+        for _, _, film, data in graph.edges(keys=True, data=True):
+            data["length"] = float(self.film_lengths[film])
+        return graph
+
+    def _measure(self, layer: Layer) -> Floats:
+        tail, head = self.film_ends
+        return frozen(self.cell.surface.arc_measure(tail, head, self.film_offsets, layer))
+
+    def _inside(self, layer: Layer) -> Floats:
+        tail, head = self.film_ends
+        loops = self.network.loops
+        parts = self.cell.surface.loop_integrals(tail, head, self.film_offsets, loops, layer)
+        owner = self.network.bubble[loops.halves[loops.starts]]
+        return frozen(np.bincount(owner, parts, minlength=self.n_bubbles))

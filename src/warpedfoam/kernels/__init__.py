@@ -1,0 +1,1 @@
+"""Pure array functions, batched over films; numpy only."""

@@ -1,0 +1,233 @@
+"""`CellNetwork`: the combinatorial network of a foam as half-films; it knows no coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpedfoam.arrays import Ints, as_indices, frozen
+from warpedfoam.errors import TopologyError
+from warpedfoam.kernels.loops import Loops, loops_of
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+@dataclass(frozen=True, eq=False)
+class CellNetwork:
+    """Bubbles, films and vertices of a foam, by half-films.
+
+    Film f has the half-films 2f and 2f + 1, so the twin of h is ``h ^ 1``. A half-film has its bubble
+    on the left, starts at vertex ``origin[h]`` and is followed round its bubble by ``next[h]``. Three
+    films meet at a vertex; a *marker* vertex joins two and only divides a film.
+
+    Parameters
+    ----------
+    next, origin, bubble : (2 n_films,) integer arrays
+    bubble_euler : (n_bubbles,) integer array, optional
+        Euler number of each bubble, 1 (a disk) by default; an open cluster's exterior has another.
+
+    Raises
+    ------
+    TopologyError
+        If the arrays do not describe a network: see `validate`.
+
+    Examples
+    --------
+    Two bubbles that share a closed film, divided by two markers:
+
+    >>> net = CellNetwork(next=[2, 3, 0, 1], origin=[0, 1, 1, 0], bubble=[0, 1, 0, 1])
+    >>> net.n_bubbles, net.n_films, net.euler_characteristic
+    (2, 2, 2)
+    >>> net.sides
+    array([0, 0])
+    """
+
+    next: Ints
+    origin: Ints
+    bubble: Ints
+    bubble_euler: Ints
+
+    def __init__(
+        self,
+        next: ArrayLike,  # noqa: A002 - the field's word
+        origin: ArrayLike,
+        bubble: ArrayLike,
+        bubble_euler: ArrayLike | None = None,
+    ) -> None:
+        following = as_indices(next, "next", (None,))
+        count = len(following)
+        object.__setattr__(self, "next", frozen(following))
+        object.__setattr__(self, "origin", frozen(as_indices(origin, "origin", (count,))))
+        object.__setattr__(self, "bubble", frozen(as_indices(bubble, "bubble", (count,))))
+        if bubble_euler is None:
+            euler = np.ones(int(self.bubble.max(initial=-1)) + 1, dtype=np.int64)
+        else:
+            euler = np.asarray(bubble_euler)
+            if euler.ndim != 1 or euler.dtype.kind not in "iu":
+                raise TypeError("bubble_euler must be an (n_bubbles,) array of integers")
+            euler = euler.astype(np.int64)
+        object.__setattr__(self, "bubble_euler", frozen(euler))
+        self.validate()
+
+    @property
+    def n_films(self) -> int:
+        """Number of films."""
+        return len(self.next) // 2
+
+    @property
+    def n_bubbles(self) -> int:
+        """Number of bubbles."""
+        return len(self.bubble_euler)
+
+    @cached_property
+    def n_vertices(self) -> int:
+        """Number of vertices, markers included."""
+        return int(self.origin.max(initial=-1)) + 1
+
+    @property
+    def tails(self) -> Ints:
+        """Vertex where each film starts, (n_films,)."""
+        return self.origin[0::2]
+
+    @property
+    def heads(self) -> Ints:
+        """Vertex where each film ends, (n_films,)."""
+        return self.origin[1::2]
+
+    @property
+    def left(self) -> Ints:
+        """Bubble on the left of each film, (n_films,)."""
+        return self.bubble[0::2]
+
+    @property
+    def right(self) -> Ints:
+        """Bubble on the right of each film, (n_films,)."""
+        return self.bubble[1::2]
+
+    @cached_property
+    def vertex_degrees(self) -> Ints:
+        """Films at each vertex: 3, or 2 at a marker."""
+        return frozen(np.bincount(self.origin, minlength=self.n_vertices))
+
+    @cached_property
+    def markers(self) -> Ints:
+        """The twofold vertices."""
+        return frozen(np.flatnonzero(self.vertex_degrees == 2))
+
+    @cached_property
+    def loops(self) -> Loops:
+        """Half-films round each bubble, bubble after bubble."""
+        return loops_of(self.next, self.bubble)
+
+    @cached_property
+    def sides(self) -> Ints:
+        """Sides n of each bubble: corners where three films meet, (n_bubbles,)."""
+        corner = self.vertex_degrees[self.origin] == 3
+        return frozen(np.bincount(self.bubble[corner], minlength=self.n_bubbles))
+
+    @cached_property
+    def charges(self) -> Ints:
+        """Topological charges q = 6 − n, (n_bubbles,); they add up to 6 χ if all bubbles are disks."""
+        return frozen(6 - self.sides)
+
+    @cached_property
+    def euler_characteristic(self) -> int:
+        """χ = vertices − films + Σ bubble_euler, of the surface that the network fills."""
+        return self.n_vertices - self.n_films + int(self.bubble_euler.sum())
+
+    @cached_property
+    def outgoing(self) -> Ints:
+        """Half-films that start at each threefold vertex, counter-clockwise, (n_threefold, 3)."""
+        order = np.argsort(self.origin, kind="stable")
+        first = order[np.searchsorted(self.origin[order], np.flatnonzero(self.vertex_degrees == 3))]
+        # leaving along h, arriving back along its twin, the next half-film is the next one clockwise
+        second = self.next[first ^ 1]
+        return frozen(np.stack([first, self.next[second ^ 1], second], axis=1))
+
+    def validate(self) -> None:
+        """Check every rule of a network.
+
+        Raises
+        ------
+        TopologyError
+            Odd or no half-films; ``next`` not a permutation, or not staying on its bubble, or not
+            starting where the half-film ends; a vertex with fewer than two or more than three films,
+            or two fans of them; unused vertex or bubble numbers; a disk with several boundary loops.
+        """
+        count = len(self.next)
+        if count == 0 or count % 2:
+            raise TopologyError(f"a network needs an even number of half-films above 0, got {count}")
+        if (np.bincount(self.next, minlength=count)[:count] != 1).any() or self.next.max() >= count:
+            raise TopologyError("next must be a permutation of the half-films")
+        if self.bubble.max() >= self.n_bubbles:
+            raise TopologyError(
+                f"bubble names bubble {int(self.bubble.max())}, but there are {self.n_bubbles}"
+            )
+        if (self.bubble[self.next] != self.bubble).any():
+            bad = int(np.flatnonzero(self.bubble[self.next] != self.bubble)[0])
+            raise TopologyError(f"half-film {bad} and its next lie on different bubbles")
+        twin = np.arange(count) ^ 1
+        if (self.origin[self.next] != self.origin[twin]).any():
+            bad = int(np.flatnonzero(self.origin[self.next] != self.origin[twin])[0])
+            raise TopologyError(f"half-film {bad} does not end where its next begins")
+        degrees = self.vertex_degrees
+        if ((degrees != 2) & (degrees != 3)).any():
+            bad = int(np.flatnonzero((degrees != 2) & (degrees != 3))[0])
+            raise TopologyError(
+                f"vertex {bad} has {int(degrees[bad])} films; two (a marker) or three must meet"
+            )
+        around = self.next[twin]
+        thrice = np.where(degrees[self.origin] == 3, around[around[around]], around[around])
+        still = (thrice != np.arange(count)) | (around == np.arange(count))
+        if still.any():
+            raise TopologyError(
+                f"the films at vertex {int(self.origin[np.flatnonzero(still)[0]])} do not form one fan"
+            )
+        n_loops = np.bincount(self.bubble[self.loops.halves[self.loops.starts]], minlength=self.n_bubbles)
+        if (n_loops == 0).any():
+            raise TopologyError(f"bubble {int(np.flatnonzero(n_loops == 0)[0])} has no films")
+        if ((self.bubble_euler == 1) & (n_loops != 1)).any():
+            bad = int(np.flatnonzero((self.bubble_euler == 1) & (n_loops != 1))[0])
+            raise TopologyError(
+                f"bubble {bad} is said to be a disk but has {int(n_loops[bad])} boundary loops"
+            )
+
+    def to_networkx(self) -> nx.MultiGraph:
+        """Dual multigraph: bubbles as nodes (``sides``, ``charge``), films as edges keyed by film.
+
+        Examples
+        --------
+        >>> net = CellNetwork(next=[2, 3, 0, 1], origin=[0, 1, 1, 0], bubble=[0, 1, 0, 1])
+        >>> net.to_networkx().number_of_edges(0, 1)
+        2
+        """
+        import networkx as nx
+
+        graph = nx.MultiGraph()
+        graph.add_nodes_from(
+            (i, {"sides": n, "charge": q})
+            for i, (n, q) in enumerate(zip(self.sides.tolist(), self.charges.tolist(), strict=True))
+        )
+        graph.add_edges_from(
+            (a, b, f, {"film": f})
+            for f, (a, b) in enumerate(zip(self.left.tolist(), self.right.tolist(), strict=True))
+        )
+        return graph
+
+    def film_graph(self) -> nx.MultiGraph:
+        """Film multigraph: vertices as nodes, films as edges keyed by film, with the bubbles beside them."""
+        import networkx as nx
+
+        graph = nx.MultiGraph()
+        graph.add_nodes_from((v, {"degree": k}) for v, k in enumerate(self.vertex_degrees.tolist()))
+        columns = (self.tails, self.heads, self.left, self.right)
+        graph.add_edges_from(
+            (a, b, f, {"film": f, "left": left, "right": right})
+            for f, (a, b, left, right) in enumerate(zip(*(c.tolist() for c in columns), strict=True))
+        )
+        return graph

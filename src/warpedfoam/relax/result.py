@@ -1,0 +1,58 @@
+"""What a relaxation returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from warpedfoam.arrays import Floats
+from warpedfoam.foam import Foam
+from warpedfoam.moves.t1 import T1Event
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    """A relaxed foam and how it was reached.
+
+    Attributes
+    ----------
+    foam : Foam
+        The last state, with its pressures; at equilibrium only if ``converged``.
+    energy : float
+        γ Σ film areas.
+    pressures : (n_bubbles,) array
+        Multipliers of the volumes, mean zero (only differences matter on a closed surface).
+    residual : float
+        Largest projected force on a vertex or film node, in units of γ d.
+    volume_error : float
+        Largest |V − V*| / V*.
+    converged : bool
+        Both below their tolerances, and the Hessian has the inertia of a minimum.
+    is_minimum : bool
+        Whether the last Newton matrix had the inertia of a minimum.
+    iterations : int
+        Newton steps taken.
+    events : tuple of T1Event
+        Every T1 made, in order.
+    timings : mapping of str to float
+        Seconds by kind of work: ``"assemble"``, ``"solve"``, ``"t1"``, ``"total"``.
+    message : str
+        Why it ended.
+    """
+
+    foam: Foam
+    energy: float
+    pressures: Floats
+    residual: float
+    volume_error: float
+    converged: bool
+    is_minimum: bool
+    iterations: int
+    events: tuple[T1Event, ...]
+    timings: Mapping[str, float]
+    message: str
+
+    @property
+    def n_t1(self) -> int:
+        """Number of T1s made."""
+        return len(self.events)

@@ -1,0 +1,192 @@
+"""`TriangleMesh`: the numerical triangulation of a surface, as two read-only arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpedfoam.arrays import Floats, Ints, as_indices, as_points, frozen
+from warpedfoam.errors import MeshError
+
+if TYPE_CHECKING:
+    import trimesh
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Nodes and triangles, checked for shape, range and finiteness; topology is checked on demand.
+
+    Parameters
+    ----------
+    nodes : (n, 3) array
+    triangles : (m, 3) integer array
+        Counter-clockwise seen from outside.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Wrong shape, NaN, indices out of range, no nodes or no triangles.
+
+    Examples
+    --------
+    >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh.n_nodes, mesh.area
+    (3, 0.5)
+    """
+
+    nodes: Floats
+    triangles: Ints
+    _checked: bool = field(default=False, repr=False)
+
+    def __init__(self, nodes: ArrayLike, triangles: ArrayLike) -> None:
+        points = as_points(nodes, "nodes", minimum=3)
+        faces = as_indices(triangles, "triangles", (None, 3), below=len(points))
+        if not len(faces):
+            raise MeshError("triangles is empty: a mesh needs at least one triangle")
+        object.__setattr__(self, "nodes", frozen(points))
+        object.__setattr__(self, "triangles", frozen(faces))
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.nodes)
+
+    @property
+    def n_triangles(self) -> int:
+        """Number of triangles."""
+        return len(self.triangles)
+
+    @cached_property
+    def edges(self) -> Ints:
+        """Undirected edges, (n_edges, 2), each once, smaller node first."""
+        pairs = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        keys = np.unique(pairs[:, 0] * self.n_nodes + pairs[:, 1])
+        out: Ints = frozen(np.stack([keys // self.n_nodes, keys % self.n_nodes], axis=1))
+        return out
+
+    @cached_property
+    def edge_lengths(self) -> Floats:
+        """Length of each edge, (n_edges,)."""
+        ends = self.nodes[self.edges]
+        return frozen(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+    @property
+    def mean_edge(self) -> float:
+        """Mean edge length h."""
+        return float(self.edge_lengths.mean())
+
+    @cached_property
+    def triangle_areas(self) -> Floats:
+        """Area of each triangle, (n_triangles,)."""
+        a, b, c = (self.nodes[self.triangles[:, i]] for i in range(3))
+        return frozen(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+
+    @property
+    def area(self) -> float:
+        """Total area."""
+        return float(self.triangle_areas.sum())
+
+    @cached_property
+    def node_areas(self) -> Floats:
+        """A third of the area of the triangles round each node, (n,)."""
+        share = np.repeat(self.triangle_areas / 3.0, 3)
+        return frozen(np.bincount(self.triangles.ravel(), share, minlength=self.n_nodes))
+
+    @property
+    def euler_characteristic(self) -> int:
+        """χ = nodes − edges + triangles, of the nodes that triangles use."""
+        used = len(np.unique(self.triangles))
+        return used - len(self.edges) + self.n_triangles
+
+    def require_closed_surface(self) -> None:
+        """Check that the mesh is one closed, consistently oriented manifold of proper triangles.
+
+        Raises
+        ------
+        MeshError
+            With the first fault found: unreferenced nodes, coinciding nodes of a triangle, degenerate
+            triangles, edges with more than two triangles, flipped triangles, open edges, pinched
+            nodes, several components.
+        """
+        if self._checked:
+            return
+        _check_closed(self)
+        object.__setattr__(self, "_checked", True)
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """Return the mesh as a ``trimesh.Trimesh``."""
+        import trimesh
+
+        return trimesh.Trimesh(self.nodes.copy(), self.triangles.copy(), process=False)
+
+    @classmethod
+    def from_trimesh(cls, mesh: trimesh.Trimesh) -> TriangleMesh:
+        """Build from a ``trimesh.Trimesh``; anything else is a ``TypeError``."""
+        import trimesh
+
+        if not isinstance(mesh, trimesh.Trimesh):
+            raise TypeError(f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}")
+        return cls(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def _check_closed(mesh: TriangleMesh) -> None:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    tri, n = mesh.triangles, mesh.n_nodes
+    unused = np.setdiff1d(np.arange(n), tri)
+    if unused.size:
+        raise MeshError(
+            f"{unused.size} nodes belong to no triangle (first: node {unused[0]}); remove them"
+        )
+    same = (tri == np.roll(tri, 1, axis=1)).any(axis=1)
+    if same.any():
+        raise MeshError(
+            f"triangle {int(np.flatnonzero(same)[0])} uses a node twice; remove such triangles"
+        )
+    longest = np.linalg.norm(mesh.nodes[tri] - mesh.nodes[np.roll(tri, 1, axis=1)], axis=2).max(axis=1)
+    flat = mesh.triangle_areas <= 1e-10 * longest**2
+    if flat.any():
+        raise MeshError(
+            f"{int(flat.sum())} triangles have no area (first: triangle {int(np.flatnonzero(flat)[0])}); "
+            "merge coinciding nodes and collapse slivers"
+        )
+    start, end = tri.ravel(), np.roll(tri, -1, axis=1).ravel()
+    keys = start * n + end
+    directed, counts = np.unique(keys, return_counts=True)
+    undirected, uses = np.unique(np.minimum(start, end) * n + np.maximum(start, end), return_counts=True)
+    if (uses > 2).any():
+        bad = int(undirected[uses > 2][0])
+        raise MeshError(
+            f"edge ({bad // n}, {bad % n}) belongs to more than two triangles: the mesh is not a manifold; "
+            "split or remove the extra sheets"
+        )
+    if (counts > 1).any():
+        bad = int(directed[counts > 1][0])
+        raise MeshError(
+            f"the two triangles at edge ({bad // n}, {bad % n}) are oriented against each other; "
+            "flip one (trimesh.repair.fix_winding does)"
+        )
+    if (uses == 1).any():
+        bad = int(undirected[uses == 1][0])
+        raise MeshError(
+            f"the mesh is open: {int((uses == 1).sum())} rim edges (first: ({bad // n}, {bad % n})); "
+            "a closed surface is needed, fill the holes"
+        )
+    graph = coo_array((np.ones(len(start)), (start, end)), shape=(n, n))
+    pieces, _ = connected_components(graph, directed=False)
+    if pieces > 1:
+        raise MeshError(f"the mesh has {pieces} separate components; keep one")
+    # a closed manifold has one fan of triangles per node: corners linked through shared edges
+    corner = np.arange(3 * len(tri))
+    following = np.roll(corner.reshape(-1, 3), -1, axis=1).ravel()
+    order = np.argsort(keys)
+    twin = order[np.searchsorted(keys[order], end * n + start)]
+    links = coo_array((np.ones(len(corner)), (corner, following[twin])), shape=(len(corner),) * 2)
+    fans, _ = connected_components(links, directed=False)
+    if fans != n:
+        raise MeshError("two sheets touch in a single node: the mesh is not a manifold; duplicate that node")

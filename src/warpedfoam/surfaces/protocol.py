@@ -1,0 +1,166 @@
+"""What a surface must offer to carry a foam.
+
+A surface knows points and *arcs* (curves between two of its points), not foams. `Layer` says what is
+measured along an arc and inside a loop of arcs, so that one set of formulas gives lengths and areas on
+the surface, film areas and volumes between plates, and integrated curvature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from numpy.typing import ArrayLike
+
+from warpedfoam.arrays import Floats, Ints, frozen
+from warpedfoam.kernels.loops import Loops
+from warpedfoam.kernels.quadrature import gauss
+from warpedfoam.surfaces.mesh import TriangleMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Heights above the surface at which arcs are measured, and Steiner's coefficients of volumes.
+
+    Along an arc: Σ_t shares_t · length of the arc lifted to height t. Inside a loop:
+    ∫ (c0 + c1 H + c2 G) dA with ``steiner`` = (c0, c1, c2).
+    """
+
+    heights: Floats
+    shares: Floats
+    steiner: tuple[float, float, float]
+
+    @classmethod
+    def surface(cls) -> Layer:
+        """Lengths and areas on the surface itself."""
+        return cls(frozen(gauss(1)[0] * 0.0), gauss(1)[1], (1.0, 0.0, 0.0))
+
+    @classmethod
+    def curvature(cls) -> Layer:
+        """Lengths on the surface, and ∫ G dA inside a loop."""
+        return cls(frozen(gauss(1)[0] * 0.0), gauss(1)[1], (0.0, 0.0, 1.0))
+
+    @classmethod
+    def between_plates(cls, gap: float, n_heights: int = 2) -> Layer:
+        """Ruled film areas by Gauss quadrature through the gap d, and volumes d + H d² + G d³/3."""
+        heights, shares = gauss(n_heights)
+        return cls(frozen(gap * heights), frozen(gap * shares), (gap, gap**2, gap**3 / 3.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ArcTerms:
+    """Value and derivatives of arcs by (A₁, A₂, B₁, B₂, u_1 … u_{p−1}); arcs on the last axis.
+
+    ``measure`` (F,) is the arc's measure, ``gradient`` (p + 3, F) its derivative, ``volume`` (p + 3, F)
+    the derivative of the integral over the region left of the arc, and ``hessian`` (p + 3, p + 3, F),
+    if asked for, that of tension · measure − jump · (integral on the left).
+    """
+
+    measure: Floats
+    gradient: Floats
+    volume: Floats
+    hessian: Floats | None
+
+
+@runtime_checkable
+class Surface(Protocol):
+    """A smooth oriented surface; normals point into the gap and W = +I/r on a sphere of radius r."""
+
+    @property
+    def area(self) -> float:
+        """Total area."""
+        ...
+
+    @property
+    def euler_characteristic(self) -> int:
+        """χ."""
+        ...
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """A triangulation for geodesics and pictures."""
+        ...
+
+    @property
+    def size(self) -> float:
+        """Radius of a ball round the origin that holds the surface; the scale of round-off."""
+        ...
+
+    def triangulate(self, n_nodes: int) -> TriangleMesh:
+        """A triangulation with about ``n_nodes`` nodes, all on the surface."""
+        ...
+
+    def project(self, points: ArrayLike) -> Floats:
+        """Nearest points of the surface, (n, 3)."""
+        ...
+
+    def normals(self, points: ArrayLike) -> Floats:
+        """Unit normals at the projections of the points, (n, 3)."""
+        ...
+
+    def principal_curvatures(self, points: ArrayLike) -> Floats:
+        """Eigenvalues (k1, k2) of W = dn, (n, 2)."""
+        ...
+
+    def gaussian_curvature(self, points: ArrayLike) -> Floats:
+        """G = k1 k2, (n,)."""
+        ...
+
+    def curvature_range(self) -> tuple[float, float]:
+        """Least and greatest principal curvature anywhere on the surface."""
+        ...
+
+    def integral(self, layer: Layer) -> float:
+        """∫ (c0 + c1 H + c2 G) dA over the whole surface."""
+        ...
+
+    def random_points(self, count: int, rng: object) -> Floats:
+        """Points drawn uniformly by area, (count, 3)."""
+        ...
+
+    def lattice_points(self, count: int) -> Floats:
+        """An even, deterministic arrangement (a Fibonacci spiral or a rank-1 lattice), (count, 3)."""
+        ...
+
+    def vertex_frames(self, points: Floats) -> Floats:
+        """Orthonormal tangent vectors at points of the surface, (n, 2, 3)."""
+        ...
+
+    def retract(self, points: Floats, steps: Floats) -> Floats:
+        """Points moved by tangent ``steps`` (n, 2) in `vertex_frames`, back on the surface."""
+        ...
+
+    def rigid_motions(self, points: Floats) -> Floats:
+        """Velocity fields of the surface's continuous symmetries at the points, (k, n, 3)."""
+        ...
+
+    def arc_measure(self, tail: Floats, head: Floats, offsets: Floats, layer: Layer) -> Floats:
+        """Measure of each arc from ``tail`` (F, 3) to ``head`` with ``offsets`` (F, p − 1)."""
+        ...
+
+    def arc_terms(
+        self,
+        tail: Floats,
+        head: Floats,
+        offsets: Floats,
+        layer: Layer,
+        *,
+        tension: float,
+        jump: Floats | None,
+    ) -> ArcTerms:
+        """Measures and derivatives; the Hessian too if ``jump`` (F,), left minus right, is given."""
+        ...
+
+    def arc_points(self, tail: Floats, head: Floats, offsets: Floats, xi: Floats) -> Floats:
+        """Points of each arc at the parameters ``xi`` (m,) in [0, 1], (F, m, 3)."""
+        ...
+
+    def arc_fit(self, tail: Floats, head: Floats, arc: Ints, points: Floats, order: int) -> Floats:
+        """Offsets (F, p − 1) of the parabola-shaped arcs nearest to points (m, 3) of arcs (m,)."""
+        ...
+
+    def loop_integrals(
+        self, tail: Floats, head: Floats, offsets: Floats, loops: Loops, layer: Layer
+    ) -> Floats:
+        """∫ (c0 + c1 H + c2 G) dA inside each loop, (n_loops,)."""
+        ...
