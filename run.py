@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Set up warpedfoam in its own virtual environment and run it, or run all its checks.
+
+    python3 run.py foam [torus|sphere] [options]   the main job; writes to out/
+    python3 run.py test [pytest options]           ruff, mypy, layers, tests, doctests, examples
+
+Needs nothing but Python 3.11 or newer. Run it as often as you like: it installs again only when
+pyproject.toml has changed. The environment is the folder .venv beside this file.
+"""
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+
+OLDEST = (3, 11)
+HERE = os.path.dirname(os.path.abspath(__file__))
+VENV = os.path.join(HERE, ".venv")
+BIN = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
+PYTHON = os.path.join(BIN, "python.exe" if os.name == "nt" else "python")
+STAMP = os.path.join(VENV, "warpedfoam-installed")
+
+
+def say(text):
+    """Print a line of our own on stderr, so that stdout stays the command's."""
+    sys.stderr.write("run.py: " + text + "\n")
+    sys.stderr.flush()
+
+
+def fail(text):
+    say(text)
+    sys.exit(2)
+
+
+def version_of(python):
+    """(major, minor) of an interpreter, or None if it does not run."""
+    try:
+        out = subprocess.check_output(
+            [python, "-c", "import sys; print('%d %d' % sys.version_info[:2])"], stderr=subprocess.DEVNULL
+        )
+        major, minor = out.split()
+        return int(major), int(minor)
+    except (OSError, ValueError, subprocess.CalledProcessError):
+        return None
+
+
+def use_new_enough_python():
+    """Hand over to a newer interpreter if this one is too old; give up clearly if there is none."""
+    if sys.version_info[:2] >= OLDEST:
+        return
+    wanted = "%d.%d" % OLDEST
+    names = ["python3.%d" % minor for minor in range(OLDEST[1], OLDEST[1] + 8)]
+    for name in ["python3", "python", *reversed(names)]:
+        found = shutil.which(name)
+        if found and (version_of(found) or (0, 0)) >= OLDEST:
+            say("this is Python %d.%d; going on with %s" % (sys.version_info[0], sys.version_info[1], found))
+            sys.exit(subprocess.call([found, os.path.abspath(__file__), *sys.argv[1:]]))
+    fail(
+        "warpedfoam needs Python %s or newer; this is Python %d.%d and no newer one was found. "
+        "Install Python %s and run this again." % (wanted, sys.version_info[0], sys.version_info[1], wanted)
+    )
+
+
+def stamp_lines():
+    try:
+        with open(STAMP) as file:
+            return file.read().splitlines()
+    except OSError:
+        return []
+
+
+def make_environment():
+    """Make .venv, or make it anew if its interpreter is gone or too old, or the folder was moved."""
+    moved = stamp_lines()[:1] not in ([], [HERE])
+    if not moved and (version_of(PYTHON) or (0, 0)) >= OLDEST:
+        return
+    say("making a virtual environment in .venv")
+    if subprocess.call([sys.executable, "-m", "venv", "--clear", VENV], stdout=subprocess.DEVNULL) == 0:
+        return
+    # some systems ship Python without the pip that new environments get; our own pip can fill in
+    made = subprocess.call([sys.executable, "-m", "venv", "--clear", "--without-pip", VENV])
+    if made != 0 or importlib.util.find_spec("pip") is None:
+        fail(
+            "cannot make a virtual environment with %s. On Debian and Ubuntu install the package "
+            "python3-venv, then run this again." % sys.executable
+        )
+
+
+def pip_command():
+    if subprocess.call([PYTHON, "-c", "import pip"], stderr=subprocess.DEVNULL) == 0:
+        return [PYTHON, "-m", "pip"]
+    return [sys.executable, "-m", "pip", "--python", PYTHON]
+
+
+def installed_for(extra):
+    """What the stamp must say for an installation with this extra to be up to date."""
+    with open(os.path.join(HERE, "pyproject.toml"), "rb") as file:
+        return hashlib.sha256(file.read()).hexdigest() + extra
+
+
+def install(extra=""):
+    """Install the package in place with an extra, unless that has been done for this pyproject.toml."""
+    make_environment()
+    want = installed_for(extra)
+    if want in stamp_lines():
+        return
+    say("installing warpedfoam%s and what it needs (once; takes a minute or two)" % extra)
+    done = subprocess.call(
+        [*pip_command(), "install", "--quiet", "--disable-pip-version-check", "--editable", HERE + extra]
+    )
+    if done != 0:
+        fail("the installation failed; see above. A connection to a package index is needed the first time.")
+    with open(STAMP, "w") as file:
+        file.write("\n".join([HERE, installed_for(""), want]) + "\n")
+
+
+def tool(name):
+    return os.path.join(BIN, name + (".exe" if os.name == "nt" else ""))
+
+
+def foam(arguments):
+    install()
+    if not arguments or (arguments[0].startswith("-") and arguments[0] != "--help"):
+        arguments = ["torus", *arguments]
+    command = [tool("warpedfoam"), "foam", *arguments]
+    if os.name == "nt":
+        return subprocess.call(command)
+    os.execv(command[0], command)  # so that Ctrl-C and kill reach the job itself
+
+
+def test(arguments):
+    install("[dev]")
+    checks = [
+        ("ruff", [tool("ruff"), "check", "."]),
+        ("mypy", [tool("mypy"), "--strict", "src"]),
+        ("layers", [tool("lint-imports")]),
+        ("pytest", [PYTHON, "-m", "pytest", *arguments]),
+    ]
+    failed = []
+    for name, command in checks:
+        say("--- " + name)
+        if subprocess.call(command, cwd=HERE) != 0:
+            failed.append(name)
+    say("failed: " + ", ".join(failed) if failed else "all checks passed")
+    return 1 if failed else 0
+
+
+def main():
+    use_new_enough_python()
+    verbs = {"foam": foam, "test": test}
+    if len(sys.argv) < 2 or sys.argv[1] not in verbs:
+        sys.stderr.write(__doc__)
+        return 0 if sys.argv[1:] in (["-h"], ["--help"]) else 2
+    try:
+        return verbs[sys.argv[1]](sys.argv[2:])
+    except KeyboardInterrupt:
+        say("interrupted")
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,265 @@
+"""The commands; each turns its arguments into `Options` and runs the main job."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
+from typing import Annotated, Any
+
+import typer
+
+from warpedfoam.cli.progress import progress_bars
+
+NOT_CONVERGED, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
+
+app = typer.Typer(
+    help="Bubbles and foams trapped between curved plates.",
+    epilog="Exit codes: 0 converged, 1 not converged (results written all the same), 2 bad input, "
+    "3 a fault of warpedfoam's own, 130 interrupted.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+foam_app = typer.Typer(
+    help="Build and relax a foam on a surface given here, without a file.", no_args_is_help=True
+)
+app.add_typer(foam_app, name="foam")
+
+Count = Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of bubbles.")]
+Gap = Annotated[float, typer.Option("--gap", help="Distance between the plates.")]
+Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
+Seeds = Annotated[str, typer.Option("--seeds", help="Where bubbles start: random, blue or lattice.")]
+Lloyd = Annotated[int, typer.Option("--lloyd", help="Sweeps that even out the bubbles before relaxing.")]
+Volumes = Annotated[
+    float | None,
+    typer.Option("--volumes", help="Log-normal width of the bubbles' volumes; equal volumes if left out."),
+]
+Order = Annotated[int, typer.Option("--order", help="Polynomial order of the films.")]
+T1 = Annotated[bool, typer.Option("--t1/--no-t1", help="Let films turn (T1) while relaxing.")]
+Color = Annotated[str, typer.Option("--color-by", help="Colour of the picture and the PLYs: charge or pressure.")]
+Folder = Annotated[str, typer.Option("-o", "--out", help="Folder for the results.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no summary (but --json).")]
+Debug = Annotated[bool, typer.Option("--debug", help="On an error print the traceback.")]
+
+
+class Stopped(BaseException):
+    """A signal asked the run to end; raised so that files being written are tidied away."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        self.signum = signum
+
+
+@app.callback()
+def _common(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)] = False,
+) -> None:
+    if version:
+        from importlib.metadata import version as installed
+
+        print(f"warpedfoam {installed('warpedfoam')}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    file: Annotated[str, typer.Argument(help="TOML file of options.", metavar="FOAM.TOML")],
+    out: Annotated[str | None, typer.Option("-o", "--out", help="Folder for the results.")] = None,
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replace an option, such as foam.n_bubbles=500."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Random seed.")] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Build and relax the foam that a TOML file describes."""
+
+    def options() -> Any:
+        from warpedfoam.cli.config import read_options
+
+        overrides = list(sets or [])
+        if out is not None:
+            overrides.append(f"output.folder={json.dumps(out)}")
+        if seed is not None:
+            overrides.append(f"seed={seed}")
+        return read_options(file, overrides)
+
+    _run(options, as_json=as_json, quiet=quiet, debug=debug)
+
+
+@foam_app.command()
+def torus(
+    n_bubbles: Count = 200,
+    major_radius: Annotated[float, typer.Option(help="Radius of the ring.")] = 20.0,
+    minor_radius: Annotated[float, typer.Option(help="Radius of the tube.")] = 4.0,
+    gap: Gap = 0.5,
+    seed: Seed = 0,
+    seeds: Seeds = "random",
+    lloyd: Lloyd = 0,
+    volumes: Volumes = None,
+    order: Order = 4,
+    t1: T1 = True,
+    color_by: Color = "charge",
+    out: Folder = "out",
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """A foam between two tori; normals point out of the tube, the gap lies outside."""
+    surface = {"kind": "torus", "major_radius": major_radius, "minor_radius": minor_radius}
+    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
+    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
+
+
+@foam_app.command()
+def sphere(
+    n_bubbles: Count = 200,
+    radius: Annotated[float, typer.Option(help="Radius of the inner plate.")] = 10.0,
+    gap: Gap = 0.5,
+    seed: Seed = 0,
+    seeds: Seeds = "random",
+    lloyd: Lloyd = 0,
+    volumes: Volumes = None,
+    order: Order = 4,
+    t1: T1 = True,
+    color_by: Color = "charge",
+    out: Folder = "out",
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """A foam between two concentric spheres."""
+    surface = {"kind": "sphere", "radius": radius}
+    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
+    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
+
+
+def _values(
+    surface: dict[str, Any],
+    n_bubbles: int,
+    gap: float,
+    seed: int,
+    seeds: str,
+    lloyd: int,
+    volumes: float | None,
+    order: int,
+    t1: bool,
+    color_by: str,
+    out: str,
+) -> dict[str, Any]:
+    """The arguments in the shape of a TOML file."""
+    foam = {"n_bubbles": n_bubbles, "seeds": seeds, "lloyd": lloyd}
+    return {
+        "seed": seed,
+        "surface": surface,
+        "cell": {"gap": gap},
+        "foam": foam if volumes is None else {**foam, "volumes": volumes},
+        "relax": {"order": order, "t1": t1},
+        "output": {"folder": out, "color_by": color_by},
+    }
+
+
+def _checked(values: Mapping[str, Any]) -> Any:
+    from warpedfoam.cli.config import options_from
+
+    return options_from(values, "command line")
+
+
+def _run(options: Callable[[], Any], *, as_json: bool, quiet: bool, debug: bool) -> None:
+    """Run the main job, say how it went, and end with the exit code that belongs to it."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.job import run_job
+
+        chosen = options()
+        with progress_bars(quiet=quiet) as report:
+            job = run_job(chosen, report)
+        if as_json:
+            print(json.dumps(job.summary, allow_nan=False))
+        elif not quiet:
+            print(summary_text(job.record))
+    if not job.relaxation.converged:
+        _say(f"did not converge: {job.relaxation.message}; the results are marked as such")
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def summary_text(record: Mapping[str, Any]) -> str:
+    """A few lines for a reader, from a run record."""
+    options, times = record["options"], record["timings"]
+    surface = dict(options["surface"])
+    kind = surface.pop("kind")
+    sizes = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in surface.items())
+    state = "converged" if record["converged"] else "NOT CONVERGED"
+    sides = "   ".join(f"{n}: {count}" for n, count in record["sides"].items())
+    outputs = list(record["outputs"].values())
+    return "\n".join(
+        [
+            f"foam      {record['n_bubbles']} bubbles on a {kind} ({sizes}), "
+            f"gap {options['cell']['gap']:g}, seed {record['seed']}",
+            f"state     {state} after {record['iterations']} steps and {record['n_t1']} T1s, "
+            f"residual {_number(record['residual'])}, volume error {_number(record['volume_error'])}",
+            f"energy    {_number(record['energy'], 10)}, films {_number(record['length_over_honeycomb'], 5)} "
+            "times as long as the flat honeycomb's",
+            f"sides     {sides}   (charges add up to {record['sum_of_charges']} "
+            f"= 6 x {record['euler_characteristic']})",
+            f"time      {times['build']:.1f} s building, {times['relax']:.1f} s relaxing, "
+            f"{times['write']:.1f} s writing",
+            f"written   {', '.join(outputs)}",
+        ]
+    )
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    return "unknown" if value is None else f"{value:.{digits}g}"
+
+
+def _say(text: str) -> None:
+    print(f"warpedfoam: {' '.join(text.split())}", file=sys.stderr)
+
+
+@contextmanager
+def _ending_well(debug: bool) -> Iterator[None]:
+    """Turn exceptions into one line on stderr and the right exit code."""
+    from warpedfoam.errors import ConvergenceError
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        _say("interrupted; no file was left half-written")
+        raise typer.Exit(INTERRUPTED) from None
+    except Stopped as stop:
+        _say("stopped by a signal; no file was left half-written")
+        raise typer.Exit(128 + stop.signum) from None
+    except Exception as fault:
+        bad = isinstance(fault, (ValueError, TypeError, OSError))
+        if debug or not (bad or isinstance(fault, ConvergenceError)):
+            traceback.print_exc()
+        if isinstance(fault, OSError) and fault.strerror and fault.filename:
+            _say(f"{fault.filename}: {fault.strerror}")
+        else:
+            _say(str(fault) or type(fault).__name__)
+        code = BAD_INPUT if bad else NOT_CONVERGED if isinstance(fault, ConvergenceError) else FAULT
+        raise typer.Exit(code) from None
+
+
+@contextmanager
+def _signals() -> Iterator[None]:
+    """Raise `Stopped` on SIGTERM and SIGHUP inside the block."""
+
+    def stop(signum: int, frame: FrameType | None) -> None:
+        raise Stopped(signum)
+
+    names = [s for s in ("SIGTERM", "SIGHUP") if hasattr(signal, s)]
+    before = {getattr(signal, s): signal.signal(getattr(signal, s), stop) for s in names}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

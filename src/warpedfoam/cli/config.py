@@ -1,0 +1,315 @@
+"""Options of the main job: read from TOML and from ``--set``, each checked by name."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from warpedfoam.arrays import as_choice, as_flag, as_floats, as_integer, as_number, as_points
+from warpedfoam.cell import HeleShawCell
+from warpedfoam.surfaces import Sphere, Surface, Torus
+
+Section = TypeVar("Section")
+SEEDS = ("random", "blue", "lattice")
+DEFAULT_BUBBLES = 200
+
+#: Each kind of surface and the sizes that it has unless told otherwise.
+SURFACES: Mapping[str, tuple[Callable[..., Surface], Mapping[str, float]]] = {
+    "torus": (Torus, {"major_radius": 20.0, "minor_radius": 4.0}),
+    "sphere": (Sphere, {"radius": 10.0}),
+}
+
+
+def option(default: Any, read: Callable[[Any, str], Any]) -> Any:
+    """Return a dataclass field whose values ``read(value, name)`` checks and converts."""
+    return field(default=default, metadata={"read": read})
+
+
+def _at_least(minimum: int) -> Callable[[Any, str], int]:
+    return lambda value, name: as_integer(value, name, minimum=minimum)
+
+
+def _above_zero(value: Any, name: str) -> float:
+    return as_number(value, name, positive=True)
+
+
+def _one_of(*choices: str) -> Callable[[Any, str], str]:
+    return lambda value, name: as_choice(value, name, choices)
+
+
+def _text(value: Any, name: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise TypeError(f"{name} must be a text in quotes, got {value!r}")
+    return value
+
+
+def _seeds(value: Any, name: str) -> Any:
+    if isinstance(value, list):
+        return as_points(value, name).tolist()
+    return as_choice(value, name, SEEDS)
+
+
+def _volumes(value: Any, name: str) -> Any:
+    if isinstance(value, list):
+        return as_floats(value, name, (None,)).tolist()
+    return as_number(value, name, minimum=0.0)
+
+
+@dataclass(frozen=True)
+class SurfaceOptions:
+    """Which surface, and its sizes."""
+
+    kind: str = "torus"
+    sizes: Mapping[str, float] = field(default_factory=dict)
+
+    def build(self) -> Surface:
+        """Make the surface; sizes not given are those of `SURFACES`."""
+        make, defaults = SURFACES[self.kind]
+        return make(**{**defaults, **self.sizes})
+
+
+@dataclass(frozen=True)
+class CellOptions:
+    """The Hele-Shaw cell."""
+
+    gap: float = option(0.5, _above_zero)
+
+
+@dataclass(frozen=True)
+class FoamOptions:
+    """What `warpedfoam.voronoi_foam` is given; None leaves it its own default."""
+
+    n_bubbles: int | None = option(None, _at_least(1))
+    seeds: Any = option("random", _seeds)
+    lloyd: int = option(0, _at_least(0))
+    volumes: Any = option(None, _volumes)
+    n_nodes: int | None = option(None, _at_least(1))
+
+
+@dataclass(frozen=True)
+class RelaxOptions:
+    """What `warpedfoam.relax` is given; None leaves it its own default."""
+
+    order: int = option(4, _at_least(2))
+    t1: bool = option(True, as_flag)
+    max_iterations: int | None = option(None, _at_least(1))
+    tolerance: float | None = option(None, _above_zero)
+    solver: str = option("auto", _one_of("auto", "superlu", "pardiso"))
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Where the results go, and the picture's colours."""
+
+    folder: str = option("out", _text)
+    color_by: str = option("charge", _one_of("charge", "pressure"))
+    picture: bool = option(True, as_flag)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Every option of the main job."""
+
+    seed: int = option(0, _at_least(0))
+    surface: SurfaceOptions = SurfaceOptions()
+    cell: CellOptions = CellOptions()
+    foam: FoamOptions = FoamOptions()
+    relax: RelaxOptions = RelaxOptions()
+    output: OutputOptions = OutputOptions()
+
+    def build_cell(self) -> HeleShawCell:
+        """Make the Hele-Shaw cell; sizes that contradict each other raise ``ValueError``."""
+        return HeleShawCell(self.surface.build(), gap=self.cell.gap)
+
+    @property
+    def n_bubbles(self) -> int | None:
+        """Number of bubbles asked for; None if the seeds are given one by one."""
+        if self.foam.n_bubbles is None and isinstance(self.foam.seeds, str):
+            return DEFAULT_BUBBLES
+        return self.foam.n_bubbles
+
+    def as_mapping(self) -> dict[str, Any]:
+        """The options as nested plain values, shaped like the TOML file, defaults filled in."""
+        out = asdict(self)
+        out["surface"] = {"kind": self.surface.kind, **SURFACES[self.surface.kind][1], **self.surface.sizes}
+        out["foam"]["n_bubbles"] = self.n_bubbles
+        return out
+
+
+SECTIONS: Mapping[str, type[Any]] = {
+    "cell": CellOptions,
+    "foam": FoamOptions,
+    "relax": RelaxOptions,
+    "output": OutputOptions,
+}
+
+
+def read_options(path: str | Path, overrides: Iterable[str] = ()) -> Options:
+    """Read options from a TOML file, some of them replaced by ``section.name=value`` texts.
+
+    Parameters
+    ----------
+    path : str or Path
+        The TOML file; its folder plays no part.
+    overrides : iterable of str, optional
+        Such as ``"foam.n_bubbles=500"``; the value as in TOML, quotes may be left out.
+
+    Returns
+    -------
+    Options
+
+    Raises
+    ------
+    ValueError
+        Not TOML, an unknown option (near matches are named), or a value of the wrong type or range.
+    OSError
+        If the file cannot be read.
+    """
+    data = Path(path).read_bytes()
+    try:
+        values = tomllib.loads(data.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        raise ValueError(f"{path} is not a TOML file: {fault}") from None
+    origins: dict[str, str] = {}
+    for text in overrides:
+        _override(values, origins, text)
+    return options_from(values, str(path), origins)
+
+
+def options_from(
+    values: Mapping[str, Any], source: str, origins: Mapping[str, str] | None = None
+) -> Options:
+    """Check nested plain values and return them as `Options`.
+
+    Parameters
+    ----------
+    values : mapping
+        Shaped like the TOML file.
+    source : str
+        Where they come from, for messages.
+    origins : mapping of str to str, optional
+        Where single options (``"foam.lloyd"``) come from, if elsewhere.
+
+    Raises
+    ------
+    ValueError
+        As in `read_options`.
+
+    Examples
+    --------
+    >>> options_from({"foam": {"n_bubles": 3}}, "foam.toml")
+    Traceback (most recent call last):
+    ValueError: foam.toml: unknown option foam.n_bubles; did you mean foam.n_bubbles?
+    """
+    places = _Places(source, origins or {})
+    surface = _surface(_table(values, "surface", places), places)
+    known = _names(surface.kind)
+    for section, content in values.items():
+        if section in SECTIONS:
+            for name in _table(values, section, places):
+                places.require_known(f"{section}.{name}", known)
+        elif section != "surface":
+            places.require_known(section, known, table=isinstance(content, Mapping))
+    sections = {
+        section: _section(kind, section, _table(values, section, places), places)
+        for section, kind in SECTIONS.items()
+    }
+    seed = places.read("seed", values["seed"], _at_least(0)) if "seed" in values else 0
+    options = Options(seed=seed, surface=surface, **sections)
+    try:
+        options.build_cell()
+    except (TypeError, ValueError) as fault:
+        raise ValueError(f"{source}: {fault}") from None
+    return options
+
+
+@dataclass(frozen=True)
+class _Places:
+    source: str
+    origins: Mapping[str, str]
+
+    def of(self, name: str) -> str:
+        return self.origins.get(name, self.source)
+
+    def read(self, name: str, value: Any, reader: Callable[[Any, str], Any]) -> Any:
+        try:
+            return reader(value, name)
+        except (TypeError, ValueError) as fault:
+            raise ValueError(f"{self.of(name)}: {fault}") from None
+
+    def require_known(self, name: str, known: list[str], *, table: bool = False) -> None:
+        if name in known:
+            return
+        kind = "section" if table else "option"
+        raise ValueError(f"{self.of(name)}: unknown {kind} {name}; {_suggestion(name, known, table)}")
+
+
+def _suggestion(name: str, known: list[str], table: bool) -> str:
+    if table:
+        sections = ["surface", *SECTIONS]
+        near = difflib.get_close_matches(name, sections, n=1)
+        return f"did you mean {near[0]}?" if near else f"sections are {', '.join(sections)}"
+    near = difflib.get_close_matches(name, known, n=2, cutoff=0.75)
+    leaves = {known_name.rpartition(".")[2]: known_name for known_name in known}
+    near += [leaves[leaf] for leaf in difflib.get_close_matches(name.rpartition(".")[2], leaves, n=2)]
+    near = list(dict.fromkeys(near))[:2]
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    section = name.rpartition(".")[0] + "."
+    return "options are " + ", ".join([k for k in known if k.startswith(section)] or known)
+
+
+def _names(kind: str) -> list[str]:
+    names = ["seed", "surface.kind", *(f"surface.{name}" for name in SURFACES[kind][1])]
+    for section, options in SECTIONS.items():
+        names += [f"{section}.{f.name}" for f in fields(options)]
+    return names
+
+
+def _table(values: Mapping[str, Any], section: str, places: _Places) -> Mapping[str, Any]:
+    table = values.get(section, {})
+    if not isinstance(table, Mapping):
+        raise ValueError(f"{places.of(section)}: {section} must be a section, [{section}], got {table!r}")
+    return table
+
+
+def _surface(table: Mapping[str, Any], places: _Places) -> SurfaceOptions:
+    kind = places.read("surface.kind", table.get("kind", "torus"), _one_of(*SURFACES))
+    sizes = {}
+    for name, value in table.items():
+        if name != "kind":
+            places.require_known(f"surface.{name}", _names(kind))
+            sizes[name] = places.read(f"surface.{name}", value, _above_zero)
+    return SurfaceOptions(kind, sizes)
+
+
+def _section(
+    kind: type[Section], section: str, table: Mapping[str, Any], places: _Places
+) -> Section:
+    read = {f.name: f.metadata["read"] for f in fields(kind)}  # type: ignore[arg-type]
+    return kind(
+        **{name: places.read(f"{section}.{name}", value, read[name]) for name, value in table.items()}
+    )
+
+
+def _override(values: dict[str, Any], origins: dict[str, str], text: str) -> None:
+    """Put one ``section.name=value`` into the nested values."""
+    name, sign, value = (part.strip() for part in text.partition("="))
+    if not sign or not name or not value:
+        raise ValueError(f"--set {text}: write it as section.name=value, such as --set foam.n_bubbles=500")
+    try:
+        parsed: Any = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value
+    section, _, leaf = name.rpartition(".")
+    if section and section not in values:
+        origins[section] = f"--set {text}"
+    inner = values.setdefault(section, {}) if section else values
+    if not isinstance(inner, dict):
+        raise ValueError(f"--set {text}: {section} is not a section")
+    inner[leaf] = parsed
+    origins[name] = f"--set {text}"

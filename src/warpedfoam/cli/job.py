@@ -1,0 +1,213 @@
+"""The main job: surface → Voronoi foam → relaxed foam → files in a folder."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpedfoam.cli.config import Options
+from warpedfoam.cli.progress import Progress, silent
+from warpedfoam.foam import Foam
+from warpedfoam.relax.result import Relaxation
+
+HONEYCOMB = 12.0**0.25  #: film length per bubble of unit area in the flat honeycomb
+RECORD = "record.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A finished main job.
+
+    Attributes
+    ----------
+    relaxation : Relaxation
+    record : mapping
+        What ``record.json`` holds: plain numbers, texts and lists.
+    """
+
+    relaxation: Relaxation
+    record: Mapping[str, Any]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The record without options and versions, and the T1s counted, not listed."""
+        kept = {k: v for k, v in self.record.items() if k not in ("options", "versions", "command")}
+        return {**kept, "t1": {k: v for k, v in self.record["t1"].items() if k != "events"}}
+
+
+def run_job(options: Options, progress: Progress = silent) -> Job:
+    """Build a foam, relax it and write every output.
+
+    Each file is put in place by one rename; ``record.json`` goes first and comes last, so a folder
+    that has one holds the complete outputs of one run.
+
+    Parameters
+    ----------
+    options : Options
+    progress : callable, optional
+        Called with a stage's name and the fraction done.
+
+    Returns
+    -------
+    Job
+        Also if the foam did not converge: look at ``relaxation.converged``.
+
+    Raises
+    ------
+    ValueError
+        Options that make no foam; the message says which.
+    OSError
+        If the folder cannot be written.
+    """
+    from warpedfoam.io import versions
+    from warpedfoam.relax import relax
+    from warpedfoam.tessellate import voronoi_foam
+
+    folder = _folder(options.output.folder)
+    started = datetime.now(UTC)
+    cell = options.build_cell()
+    chosen = options.foam
+    clock = [time.perf_counter()]
+    start = voronoi_foam(
+        cell,
+        options.n_bubbles,
+        seeds=chosen.seeds if isinstance(chosen.seeds, str) else np.asarray(chosen.seeds),
+        seed=options.seed,
+        lloyd=chosen.lloyd,
+        volumes=np.asarray(chosen.volumes) if isinstance(chosen.volumes, list) else chosen.volumes,
+        n_nodes=chosen.n_nodes,
+        order=options.relax.order,
+        progress=progress,
+    )
+    clock.append(time.perf_counter())
+    limits = {"max_iterations": options.relax.max_iterations, "tolerance": options.relax.tolerance}
+    relaxed = relax(
+        start,
+        order=options.relax.order,
+        t1=options.relax.t1,
+        solver=options.relax.solver,
+        progress=progress,
+        **{name: value for name, value in limits.items() if value is not None},
+    )
+    clock.append(time.perf_counter())
+    outputs = _write_outputs(folder, relaxed.foam, options, progress)
+    clock.append(time.perf_counter())
+    record = {
+        **_results(start, relaxed),
+        "timings": {
+            **dict(zip(("build", "relax", "write"), np.diff(clock).tolist(), strict=True)),
+            "relax_parts": dict(relaxed.timings),
+        },
+        "started": started.isoformat(timespec="seconds"),
+        "seed": options.seed,
+        "options": options.as_mapping(),
+        "versions": dict(versions()),
+        "command": sys.argv,
+        "outputs": {name: str(path) for name, path in outputs.items()},
+    }
+    record = _plain(record)
+    _write_record(folder / RECORD, record)
+    progress("write", 1.0)
+    return Job(relaxed, record)
+
+
+def _folder(name: str) -> Path:
+    """Make the folder, or say now, not after the run, that it cannot be written."""
+    folder = Path(name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise NotADirectoryError(f"the output folder {name} is a file; choose another with -o") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(f"the output folder {name} cannot be written; choose another with -o")
+    return folder
+
+
+def _write_outputs(folder: Path, foam: Foam, options: Options, progress: Progress) -> dict[str, Path]:
+    from warpedfoam.io import save, write_bubbles_csv, write_films_csv, write_ply
+
+    (folder / RECORD).unlink(missing_ok=True)
+    progress("write", 0.0)
+    color_by = options.output.color_by
+    ply, view = write_ply(folder / "foam.ply", foam, color_by=color_by)
+    progress("write", 0.3)
+    paths = {"ply": Path(ply), "view": Path(view)}
+    for name, file, write in (
+        ("bubbles", "bubbles.csv", write_bubbles_csv),
+        ("films", "films.csv", write_films_csv),
+        ("state", "foam.npz", save),
+    ):
+        write(folder / file, foam)
+        paths[name] = folder / file
+    progress("write", 0.5)
+    picture = folder / "foam.png"
+    if options.output.picture:
+        from warpedfoam.plot import save_picture
+
+        save_picture(picture, foam, color_by=color_by)
+        paths["picture"] = picture
+    else:
+        picture.unlink(missing_ok=True)
+    return {**paths, "record": folder / RECORD}
+
+
+def _write_record(path: Path, record: Mapping[str, Any]) -> None:
+    from warpedfoam.io import write_record
+
+    write_record(path, record)
+
+
+def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
+    foam = relaxed.foam
+    network = foam.network
+    sides, counts = np.unique(network.sides, return_counts=True)
+    honeycomb = HONEYCOMB * float(np.sqrt(foam.bubble_areas).sum())
+    return {
+        "converged": relaxed.converged,
+        "is_minimum": relaxed.is_minimum,
+        "message": relaxed.message,
+        "iterations": relaxed.iterations,
+        "residual": relaxed.residual,
+        "volume_error": relaxed.volume_error,
+        "energy": relaxed.energy,
+        "energy_start": start.energy,
+        "length": float(foam.film_lengths.sum()),
+        "length_over_honeycomb": float(foam.film_lengths.sum()) / honeycomb,
+        "n_bubbles": network.n_bubbles,
+        "n_films": network.n_films,
+        "n_vertices": network.n_vertices,
+        "sides": {str(n): count for n, count in zip(sides.tolist(), counts.tolist(), strict=True)},
+        "mu2": float(np.mean((network.sides - 6.0) ** 2)),
+        "sum_of_charges": int(network.charges.sum()),
+        "euler_characteristic": network.euler_characteristic,
+        "pressure_range": [float(relaxed.pressures.min()), float(relaxed.pressures.max())],
+        "n_t1": relaxed.n_t1,
+        "t1": {
+            "count": relaxed.n_t1,
+            "energy_change": float(sum(e.energy_after - e.energy_before for e in relaxed.events)),
+            "events": [asdict(event) for event in relaxed.events],
+        },
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Turn numpy numbers into Python's, NaN and infinities into None, so that any reader takes the JSON."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

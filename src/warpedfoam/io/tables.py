@@ -1,0 +1,127 @@
+"""Tables of bubbles and films as CSV, one row each, numbers in full precision."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpedfoam.arrays import Floats
+from warpedfoam.foam import Foam
+from warpedfoam.io.atomic import PathLike, as_path, atomic_text
+
+Columns = dict[str, list[Any]]
+
+
+def write_bubbles_csv(path: PathLike, foam: Foam) -> Path:
+    """Write one row per bubble.
+
+    Columns: ``id``; ``x, y, z`` of its centre; ``sides``; ``charge``; ``area`` and ``volume``;
+    ``pressure`` (blank if the foam has none); ``energy_share``, half the energy of its films;
+    ``gaussian_curvature``, the mean over the bubble. The energy shares add up to the foam's energy.
+
+    Parameters
+    ----------
+    path : str or path
+    foam : Foam
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    TypeError
+        If ``foam`` is not a Foam.
+    FileNotFoundError, IsADirectoryError, ValueError
+        If the path cannot be written.
+    """
+    network = _checked(foam).network
+    x, y, z = foam.bubble_centres.T
+    columns: Columns = {
+        "id": foam.bubble_ids.tolist(),
+        "x": x.tolist(),
+        "y": y.tolist(),
+        "z": z.tolist(),
+        "sides": network.sides.tolist(),
+        "charge": network.charges.tolist(),
+        "area": foam.bubble_areas.tolist(),
+        "volume": foam.bubble_volumes.tolist(),
+        "pressure": _or_blank(foam.pressures, foam.n_bubbles),
+        "energy_share": _energy_shares(foam).tolist(),
+        "gaussian_curvature": (foam.bubble_curvatures / foam.bubble_areas).tolist(),
+    }
+    return _write(path, columns)
+
+
+def write_films_csv(path: PathLike, foam: Foam) -> Path:
+    """Write one row per film.
+
+    Columns: ``film``; ``left`` and ``right``, the ids of the bubbles beside it; ``tail`` and ``head``,
+    the vertices where it starts and ends; ``length`` on the inner plate; ``area`` between the plates;
+    ``pressure_jump``, left minus right (blank if the foam has no pressures); ``x, y, z`` of its middle.
+
+    Parameters
+    ----------
+    path : str or path
+    foam : Foam
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    TypeError
+        If ``foam`` is not a Foam.
+    FileNotFoundError, IsADirectoryError, ValueError
+        If the path cannot be written.
+    """
+    network = _checked(foam).network
+    x, y, z = foam.film_curves_at(np.array([0.5]))[:, 0].T
+    jump = None if foam.pressures is None else foam.pressures[network.left] - foam.pressures[network.right]
+    columns: Columns = {
+        "film": list(range(network.n_films)),
+        "left": foam.bubble_ids[network.left].tolist(),
+        "right": foam.bubble_ids[network.right].tolist(),
+        "tail": network.tails.tolist(),
+        "head": network.heads.tolist(),
+        "length": foam.film_lengths.tolist(),
+        "area": foam.film_areas.tolist(),
+        "pressure_jump": _or_blank(jump, network.n_films),
+        "x": x.tolist(),
+        "y": y.tolist(),
+        "z": z.tolist(),
+    }
+    return _write(path, columns)
+
+
+def _energy_shares(foam: Foam) -> Floats:
+    """Half of each film's energy to the bubble on either side: both halves if they are one bubble."""
+    shares: Floats = np.bincount(
+        foam.network.bubble, np.repeat(0.5 * foam.tension * foam.film_areas, 2), minlength=foam.n_bubbles
+    )
+    return shares
+
+
+def _or_blank(values: Floats | None, count: int) -> list[Any]:
+    return [""] * count if values is None else values.tolist()
+
+
+def _checked(foam: object) -> Foam:
+    if not isinstance(foam, Foam):
+        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    return foam
+
+
+def _write(path: PathLike, columns: Columns) -> Path:
+    target = as_path(path)
+    with atomic_text(target) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+    return target

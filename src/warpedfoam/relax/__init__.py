@@ -1,0 +1,6 @@
+"""Relaxation of foams: Newton's method on energy and volumes, with T1s between the steps."""
+
+from warpedfoam.relax.driver import relax
+from warpedfoam.relax.result import Relaxation
+
+__all__ = ["Relaxation", "relax"]

@@ -1,0 +1,289 @@
+"""`relax`: a foam to its local minimum of energy at fixed volumes, with T1s on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from warpedfoam.arrays import Floats, as_flag, as_integer, as_number, frozen
+from warpedfoam.foam import Foam
+from warpedfoam.moves.t1 import T1Event
+from warpedfoam.relax.linear import factoriser
+from warpedfoam.relax.result import Relaxation
+from warpedfoam.relax.sweep import SHORT, plan_sweep, realigned, turned
+from warpedfoam.relax.system import (
+    Linearised,
+    Residuals,
+    State,
+    Step,
+    Stopwatch,
+    System,
+    one_ring,
+    pinned_unknowns,
+)
+
+#: Compressibility of the proximal steps, in ℓ³ w² / γ, and the largest volume error they aim at.
+SOFTNESS, VOLUME_STEP = 0.02, 0.15
+#: Largest changes in one proximal step: of a vertex (in ℓ), of an offset.
+VERTEX_CAP, OFFSET_CAP = 0.3, 0.2
+#: Exact Newton starts below the first residual and is left above the second or at longer steps.
+EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
+
+
+@dataclass
+class _Run:
+    """The moving parts of one relaxation."""
+
+    system: System
+    state: State
+    foam: Foam
+    t1: bool
+    turns: np.ndarray
+    pins: np.ndarray
+    iteration: int = 0
+    events: list[T1Event] = field(default_factory=list)
+    is_minimum: bool = False
+
+
+def relax(
+    foam: Foam,
+    *,
+    order: int | None = None,
+    t1: bool = True,
+    tolerance: float = 1e-10,
+    max_iterations: int = 1000,
+    solver: str = "auto",
+    progress: Callable[[str, float], None] | None = None,
+) -> Relaxation:
+    """Relax a foam to a local minimum of its film energy, every bubble's volume held.
+
+    Minimises E = γ Σ (film areas through the gap) subject to V_i = V_i*. Far from equilibrium the
+    steps are a proximal method of multipliers with local shifts; close to it Newton's method on the
+    KKT system, with exact second derivatives and the film offsets eliminated film by film. Films
+    that are about to vanish turn (T1) between steps if the pull of their neighbours favours it.
+    Time grows as about N^1.2; one step costs little more than its sparse factorisation.
+
+    Parameters
+    ----------
+    foam : Foam
+    order : int, optional
+        p of the films, 2 … 24; the foam's own by default. 4 for daily use, 8 for checks.
+    t1 : bool, optional
+        Whether films may turn. Without T1s a film that wants to vanish keeps the foam from
+        converging, which is reported.
+    tolerance : float, optional
+        Of the residual, in γ d; at least 1e-13. Volumes are held to a hundredth of it, relative.
+    max_iterations : int, optional
+    solver : {"auto", "superlu", "pardiso"}, optional
+        Sparse solver; ``"auto"`` takes pardiso if the package pypardiso is installed.
+    progress : callable, optional
+        Called as ``progress("relax", fraction)`` after each step.
+
+    Returns
+    -------
+    Relaxation
+        Look at ``.converged`` before use: a foam that did not converge is returned as it stands.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of the wrong type or out of range.
+
+    Examples
+    --------
+    >>> from warpedfoam import HeleShawCell, Sphere, voronoi_foam
+    >>> foam = voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), n_bubbles=12, seeds="lattice")
+    >>> result = relax(foam, order=8)
+    >>> result.converged, round(float(result.foam.film_lengths.sum()), 6)
+    (True, 21.89183)
+    """
+    if not isinstance(foam, Foam):
+        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    with_t1 = as_flag(t1, "t1")
+    tol = as_number(tolerance, "tolerance", minimum=1e-13)
+    limit = as_integer(max_iterations, "max_iterations", minimum=0)
+    p = foam.order if order is None else as_integer(order, "order", minimum=2, maximum=24)
+    method = factoriser(solver)
+    start = foam.with_order(p)
+    system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles)
+    clock = Stopwatch(system.timings)
+    scale = foam.tension * system.film_unit / system.mean_volume
+    pressures = np.zeros(foam.n_bubbles) if foam.pressures is None else foam.pressures / scale
+    state = State(start.network, start.vertex_points, start.film_offsets, pressures)
+    run = _Run(
+        system,
+        state,
+        start,
+        with_t1,
+        np.zeros(start.network.n_films, dtype=np.int64),
+        pinned_unknowns(foam.cell, start.vertex_points),
+    )
+    residuals, converged = _iterate(run, tol, limit, progress)
+    clock.lap("total")
+    state = run.state
+    pressures = frozen((state.pressures - state.pressures.mean()) * scale)
+    final = replace(
+        start,
+        network=state.network,
+        vertex_points=state.points,
+        film_offsets=state.offsets,
+        pressures=pressures,
+    )
+    return Relaxation(
+        foam=final,
+        energy=final.energy,
+        pressures=pressures,
+        residual=residuals.force,
+        volume_error=residuals.volume_error,
+        converged=converged,
+        is_minimum=run.is_minimum,
+        iterations=run.iteration,
+        events=tuple(run.events),
+        timings=MappingProxyType(dict(system.timings)),
+        message=_message(converged, residuals, run, tol, limit),
+    )
+
+
+def _iterate(
+    run: _Run, tolerance: float, limit: int, progress: Callable[[str, float], None] | None
+) -> tuple[Residuals, bool]:
+    exact = False
+    while True:
+        lin = run.system.linearise(run.state)
+        now = lin.residuals
+        worst = max(now.force, 100.0 * now.volume_error)
+        if progress is not None:
+            span = np.log10(max(worst, tolerance)) / np.log10(tolerance)
+            progress("relax", float(np.clip(span, 0.0, 1.0)))
+        done = now.force <= tolerance and now.volume_error <= max(0.01 * tolerance, 1e-12)
+        if done or run.iteration >= limit or not np.isfinite(now.force):
+            if np.isfinite(now.force):
+                run.is_minimum = _is_minimum(run, lin)
+            return now, done and run.is_minimum
+        error = float(np.abs(now.volume).max())
+        if not exact:
+            exact = now.force < EXACT_BELOW and error < EXACT_BELOW
+        elif now.force > EXACT_ABOVE:
+            exact = False
+        if exact:
+            exact = _exact_step(run, lin)
+        else:
+            _proximal_step(run, lin)
+        run.iteration += 1
+
+
+def _proximal_step(run: _Run, lin: Linearised) -> None:
+    """One proximal step with local shifts, and the T1s that it calls for."""
+    network = run.state.network
+    residual = one_ring(network, lin.residuals.vertex)
+    shift = np.maximum(1e-5, residual / 0.15 * np.minimum(1.0, residual / 0.5))
+    fault = np.clip(lin.residuals.volume, -VOLUME_STEP, VOLUME_STEP)
+    softness = np.full(network.n_bubbles, SOFTNESS)
+    condensed = lin.condensed(positive=True)
+    step, _ = lin.solve(condensed, np.repeat(shift[:, None], 2, axis=1), softness, fault)
+    size = np.linalg.norm(step.vertices, axis=1, keepdims=True)
+    vertices = step.vertices * np.minimum(1.0, VERTEX_CAP / np.maximum(size, 1e-300))
+    offsets = np.clip(step.offsets, -OFFSET_CAP, OFFSET_CAP)
+    _advance(run, Step(vertices, offsets, step.pressures))
+
+
+def _advance(run: _Run, step: Step) -> None:
+    """Apply a step film by film limited, then turn and realign films."""
+    clock = Stopwatch(run.system.timings)
+    cell, length = run.system.cell, run.system.length
+    sweep = plan_sweep(cell, run.state, step, length, run.turns, t1=run.t1)
+    limited = Step(step.vertices * sweep.limit[:, None], step.offsets, step.pressures)
+    state = _moved(run, limited, 1.0)
+    if sweep.failing.size:
+        state = realigned(cell, state, sweep, length)
+    if sweep.turning.size:
+        state, events = turned(
+            cell, state, sweep, length, run.iteration, run.foam.tension, run.foam.bubble_ids
+        )
+        run.events.extend(events)
+        run.turns[sweep.turning] += 1
+    run.state = state
+    clock.lap("t1")
+
+
+def _exact_step(run: _Run, lin: Linearised) -> bool:
+    """One step on the KKT system; False if the proximal steps must take over."""
+    now = lin.residuals
+    shift = float(np.clip(0.05 * now.force, 1e-10, 0.03))
+    condensed = lin.condensed(positive=False)
+    fault = now.volume
+    while True:
+        step, right = _kkt_step(run, lin, condensed, shift, fault)
+        if right or shift >= 1.0:
+            break
+        shift = max(10.0 * shift, 1e-3)
+    size = max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
+    if not right or not np.isfinite(size):
+        _proximal_step(run, lin)
+        return False
+    if size > EXACT_STEP or _collapses(run, step):
+        _proximal_step(run, lin)
+        return False
+    run.state = _moved(run, step, 1.0)
+    return True
+
+
+def _kkt_step(
+    run: _Run, lin: Linearised, condensed: object, shift: float, fault: Floats
+) -> tuple[Step, bool]:
+    from warpedfoam.kernels.condense import Condensed
+
+    assert isinstance(condensed, Condensed)
+    network = run.state.network
+    vertex = np.full(2 * network.n_vertices, shift)
+    vertex[run.pins] += 1.0
+    pressure = np.zeros(network.n_bubbles)
+    pressure[0] = 1.0  # the volumes add up to the cell's: one constraint is redundant
+    step, factor = lin.solve(condensed, vertex.reshape(-1, 2), pressure, fault)
+    return step, factor.n_negative == network.n_bubbles and not condensed.negative.any()
+
+
+def _is_minimum(run: _Run, lin: Linearised) -> bool:
+    """Whether the Hessian at this state, rigid motions pinned, has the inertia of a minimum."""
+    _, right = _kkt_step(run, lin, lin.condensed(positive=False), 1e-10, lin.residuals.volume)
+    return right
+
+
+def _collapses(run: _Run, step: Step) -> bool:
+    """Whether a step would make a film shorter than the T1 length, and shorter than it is."""
+    network, length = run.state.network, run.system.length
+    moved = run.system.cell.surface.retract(run.state.points, length * step.vertices)
+    old = run.state.points[network.heads] - run.state.points[network.tails]
+    new = moved[network.heads] - moved[network.tails]
+    was, now = np.linalg.norm(old, axis=1), np.linalg.norm(new, axis=1)
+    against = np.einsum("fi,fi->f", old, new) < 0.0
+    return bool((((now < SHORT * length) & (now < was)) | against).any()) and run.t1
+
+
+def _moved(run: _Run, step: Step, share: float) -> State:
+    state = run.state
+    surface, length = run.system.cell.surface, run.system.length
+    return State(
+        state.network,
+        surface.retract(state.points, share * length * step.vertices),
+        state.offsets + share * step.offsets,
+        state.pressures + share * step.pressures,
+    )
+
+
+def _message(
+    converged: bool, residuals: Residuals, run: _Run, tolerance: float, limit: int
+) -> str:
+    if converged:
+        return f"converged in {run.iteration} steps with {len(run.events)} T1s"
+    if not np.isfinite(residuals.force):
+        return "stopped: a force became infinite or undefined; a film has degenerated"
+    if residuals.force <= tolerance:
+        return "stopped at a stationary foam that is no minimum"
+    return (
+        f"not converged after {run.iteration} of {limit} steps: residual {residuals.force:.2e} "
+        f"(wanted {tolerance:.0e}), volume error {residuals.volume_error:.2e}"
+    )

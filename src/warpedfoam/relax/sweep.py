@@ -1,0 +1,151 @@
+"""T1s between Newton steps: which films turn, how far vertices may move, and the state afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpedfoam.arrays import Bools, Floats, Ints
+from warpedfoam.cell import HeleShawCell
+from warpedfoam.moves.t1 import (
+    T1Event,
+    T1Sites,
+    allowed,
+    independent,
+    lay_films,
+    outward_tangents,
+    pulls,
+    rewire,
+    t1_sites,
+)
+from warpedfoam.relax.system import State, Step
+
+#: A film turns if it would become shorter than this, in bubble sizes (0.1 makes T1s cycle).
+SHORT = 0.02
+#: A new film is this long at least, and a turned long film this long at most.
+NEW_LENGTH = (0.03, 0.1)
+#: The pull on the new film must exceed the pull on the old one by this, and by this per earlier T1.
+PREFERENCE = (1e-3, 0.02)
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Films about to vanish, those among them that turn, and the limit on each vertex's step."""
+
+    failing: Ints
+    turning: Ints
+    along: Floats
+    current: Floats
+    limit: Floats
+
+
+def plan_sweep(
+    cell: HeleShawCell, state: State, step: Step, length: float, turns: Ints, *, t1: bool
+) -> Sweep:
+    """Find films that the step would make vanish, and decide which of them turn.
+
+    A film fails if its chord would shrink below ``SHORT`` bubble sizes or reverse. It turns if the
+    pull of its neighbours on the turned film is greater than on it, ``turns`` counting its earlier
+    T1s. All other films keep half of their chord.
+    """
+    network = state.network
+    moved = cell.surface.retract(state.points, length * step.vertices)
+    old = state.points[network.heads] - state.points[network.tails]
+    new = moved[network.heads] - moved[network.tails]
+    was = np.linalg.norm(old, axis=1) / length
+    now = np.linalg.norm(new, axis=1) / length
+    reversed_ = np.einsum("fi,fi->f", old, new) < 0.0
+    fails = ((now < SHORT) & (now < was)) | reversed_
+    shrink = np.where(reversed_, was + now, was - now)
+    share = np.where(shrink > 0.5 * was, 0.5 * was / np.maximum(shrink, 1e-300), 1.0)
+    failing = np.flatnonzero(fails)
+    if not t1:
+        failing = failing[:0]
+    empty = np.zeros((0, 3))
+    sites = t1_sites(network, failing)
+    fine = allowed(network, sites)
+    threefold = (network.vertex_degrees[network.origin[np.stack([sites.a, sites.c])]] == 3).all(axis=0)
+    failing, fine = failing[threefold], fine[threefold]
+    turning, along, current = failing[:0], empty, empty
+    if failing.size:
+        sites = t1_sites(network, failing)
+        tangents = outward_tangents(cell.surface, network, state.points, state.offsets, sites.outer)
+        current, turned = pulls(tangents)
+        gain = np.linalg.norm(turned, axis=1) - np.linalg.norm(current, axis=1)
+        wins = fine & (gain > PREFERENCE[0] + PREFERENCE[1] * turns[failing])
+        if wins.any():
+            chosen = np.flatnonzero(wins)
+            apart = independent(_only(sites, wins), gain[chosen])
+            turning, along = failing[chosen[apart]], turned[chosen[apart]]
+    share[turning] = 1.0
+    limit = np.ones(network.n_vertices)
+    np.minimum.at(limit, network.tails, share)
+    np.minimum.at(limit, network.heads, share)
+    return Sweep(failing, turning, along, current, limit)
+
+
+def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> State:
+    """Lay films that fail but do not turn along the pull on them, where they point against it."""
+    staying = ~np.isin(sweep.failing, sweep.turning)
+    films, pull = sweep.failing[staying], sweep.current[staying]
+    network = state.network
+    chord = state.points[network.tails[films]] - state.points[network.heads[films]]
+    against = np.einsum("ki,ki->k", chord, pull) < 0.0
+    films, pull, chord = films[against], pull[against], chord[against]
+    if not films.size:
+        return state
+    span = np.maximum(np.linalg.norm(chord, axis=1), 0.5 * SHORT * length)
+    sites = t1_sites(network, films)
+    points, _ = lay_films(cell.surface, network, state.points, state.offsets, sites, pull, span)
+    offsets = state.offsets.copy()
+    offsets[films] = 0.0
+    return replace(state, points=points, offsets=offsets)
+
+
+def turned(
+    cell: HeleShawCell,
+    state: State,
+    sweep: Sweep,
+    length: float,
+    iteration: int,
+    tension: float,
+    bubble_ids: Ints,
+) -> tuple[State, list[T1Event]]:
+    """The state after the sweep's T1s, and their events."""
+    network = state.network
+    films = sweep.turning
+    sites = t1_sites(network, films)
+    five = np.concatenate([films[:, None], sites.outer >> 1], axis=1)
+    before = _energies(cell, state, five)
+    chord = np.linalg.norm(state.points[network.tails[films]] - state.points[network.heads[films]], axis=1)
+    span = np.maximum(NEW_LENGTH[0] * length, np.minimum(chord, NEW_LENGTH[1] * length))
+    points, offsets = lay_films(cell.surface, network, state.points, state.offsets, sites, sweep.along, span)
+    after_state = State(rewire(network, films), points, offsets, state.pressures)
+    after = _energies(cell, after_state, five)
+    middle = cell.surface.project(
+        0.5 * (points[network.origin[sites.a]] + points[network.origin[sites.c]])
+    )
+    ids = bubble_ids[sites.bubbles].tolist()
+    columns = zip(
+        films.tolist(), ids, middle.tolist(), (tension * before).tolist(), (tension * after).tolist(), strict=True
+    )
+    events = [
+        T1Event(iteration, film, (four[0], four[1]), (four[2], four[3]), (at[0], at[1], at[2]), e0, e1)
+        for film, four, at, e0, e1 in columns
+    ]
+    return after_state, events
+
+
+def _energies(cell: HeleShawCell, state: State, films: Ints) -> Floats:
+    flat, network = films.ravel(), state.network
+    tail, head = state.points[network.tails[flat]], state.points[network.heads[flat]]
+    areas = cell.surface.arc_measure(tail, head, state.offsets[flat], cell.layer)
+    out: Floats = areas.reshape(films.shape).sum(axis=1)
+    return out
+
+
+def _only(sites: T1Sites, keep: Bools) -> T1Sites:
+    return T1Sites(
+        sites.a[keep], sites.c[keep], sites.a0[keep], sites.a1[keep], sites.b0[keep], sites.b1[keep], sites.bubbles[keep]
+    )

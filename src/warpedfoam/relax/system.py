@@ -1,0 +1,239 @@
+"""The Newton system of a foam at one state, in units of the bubble size.
+
+Lengths are in ℓ = sqrt(A/N), energies in γ d ℓ, volumes in V̄/1 with V̄ the mean volume. The unknowns
+are vertex steps, film offsets and pressures; the offsets are eliminated film by film.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from warpedfoam.arrays import Floats, Ints
+from warpedfoam.cell import HeleShawCell
+from warpedfoam.energy import bubble_volumes, film_terms
+from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
+from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.network import CellNetwork
+from warpedfoam.relax.linear import Factor, Factoriser
+from warpedfoam.relax.pattern import Pattern
+
+
+class Stopwatch:
+    """Adds the seconds since it was last read to a kind of work."""
+
+    def __init__(self, timings: dict[str, float]) -> None:
+        self._timings, self._last = timings, perf_counter()
+
+    def lap(self, kind: str) -> None:
+        """Book the time since the last lap under ``kind``."""
+        now = perf_counter()
+        self._timings[kind] += now - self._last
+        self._last = now
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One state of a relaxation; ``pressures`` are in units of γ d ℓ / V̄."""
+
+    network: CellNetwork
+    points: Floats
+    offsets: Floats
+    pressures: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Vertex steps in ℓ (n_vertices, 2), offsets (F, p − 1) and pressures (n_bubbles,) to add."""
+
+    vertices: Floats
+    offsets: Floats
+    pressures: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """How far a state is from equilibrium.
+
+    ``vertex`` (n_vertices,): net force on each vertex, and on the nodes of its films, in γ d.
+    ``volume`` (n_bubbles,): V − V* in V̄. ``force``: largest of ``vertex``.
+    """
+
+    vertex: Floats
+    volume: Floats
+    force: float
+    volume_error: float
+
+
+class System:
+    """Builds and solves the Newton systems of one foam, and keeps the time they take."""
+
+    def __init__(
+        self, cell: HeleShawCell, targets: Floats, order: int, factoriser: Factoriser, n_bubbles: int
+    ) -> None:
+        self.cell, self.targets, self.factoriser = cell, targets, factoriser
+        self.length = float(np.sqrt(cell.surface.area / n_bubbles))
+        self.film_unit = float(cell.layer.shares.sum()) * self.length
+        self.mean_volume = float(targets.mean())
+        self.rule = lobatto(order)
+        self.timings = {"assemble": 0.0, "solve": 0.0, "pattern": 0.0, "t1": 0.0, "total": 0.0}
+        self._pattern: Pattern | None = None
+        self._network: CellNetwork | None = None
+        n = order - 1
+        stiffness = self.rule.products.sum(axis=0).reshape(n, n, 1)
+        # pivots of a straight film of unit length: what an eliminated offset's pivot should be
+        self.reference = condense(stiffness.copy(), np.zeros((n, 1)), 0, None).pivots
+
+    def pattern(self, network: CellNetwork) -> Pattern:
+        """The sparsity pattern, built anew when the topology has changed."""
+        if self._pattern is None or self._network is not network:
+            clock = Stopwatch(self.timings)
+            self._pattern, self._network = Pattern(network), network
+            clock.lap("pattern")
+        return self._pattern
+
+    def linearise(self, state: State) -> Linearised:
+        """Forces, volumes and second derivatives at a state."""
+        return Linearised(self, state)
+
+
+class Linearised:
+    """Forces, volume errors and film Hessians at one state."""
+
+    def __init__(self, system: System, state: State) -> None:
+        clock = Stopwatch(system.timings)
+        self.system, self.state = system, state
+        network = state.network
+        terms = film_terms(
+            system.cell,
+            network,
+            state.points,
+            state.offsets,
+            tension=1.0 / system.film_unit,
+            pressures=state.pressures / system.mean_volume,
+        )
+        assert terms.hessian is not None
+        self.area = terms.measure
+        self.hessian, self.volume = terms.hessian, terms.volume / system.mean_volume
+        jump = state.pressures[network.left] - state.pressures[network.right]
+        self.force = terms.gradient / system.film_unit - jump * self.volume
+        self.hessian[:4] *= system.length
+        self.hessian[:, :4] *= system.length
+        self.volume[:4] *= system.length
+        self.force[:4] *= system.length
+        volumes = bubble_volumes(system.cell, network, state.points, state.offsets)
+        self.volume_fault = (volumes - system.targets) / system.mean_volume
+        relative = np.abs(volumes - system.targets) / system.targets
+        self.residuals = self._residuals(float(relative.max()))
+        clock.lap("assemble")
+
+    @property
+    def energy(self) -> float:
+        """Σ film areas / (d ℓ)."""
+        return float(self.area.sum()) / self.system.film_unit
+
+    def _residuals(self, volume_error: float) -> Residuals:
+        network = self.state.network
+        count = network.n_vertices
+        ends = np.concatenate([2 * network.tails, 2 * network.tails + 1, 2 * network.heads, 2 * network.heads + 1])
+        net = np.bincount(ends, self.force[:4].ravel(), minlength=2 * count).reshape(count, 2)
+        at_vertex = np.linalg.norm(net, axis=1)
+        if len(self.force) > 4:
+            # an offset u moves its node by u times the film's length
+            chord = self.area / self.system.film_unit
+            at_nodes = np.abs(self.force[4:]).max(axis=0) / np.maximum(chord, 1e-12)
+            np.maximum.at(at_vertex, network.tails, at_nodes)
+            np.maximum.at(at_vertex, network.heads, at_nodes)
+        force = float(at_vertex.max())
+        if not np.isfinite(force) or not np.isfinite(volume_error):
+            force = np.inf
+        return Residuals(at_vertex, self.volume_fault, force, volume_error)
+
+    def condensed(self, *, positive: bool) -> Condensed:
+        """Film blocks on (A₁, A₂, B₁, B₂, pressure jump), offsets eliminated.
+
+        ``positive`` mends weak or negative offset pivots and makes the vertex blocks positive
+        semidefinite: then a step exists whatever the state.
+        """
+        clock = Stopwatch(self.system.timings)
+        n, count = len(self.force) - 4, self.force.shape[1]
+        matrix = np.empty((5 + n, 5 + n, count))
+        take = np.concatenate([np.arange(4), 4 + np.arange(n)])
+        put = np.concatenate([np.arange(4), 5 + np.arange(n)])
+        matrix[np.ix_(put, put)] = self.hessian[np.ix_(take, take)]
+        matrix[put, 4] = -self.volume
+        matrix[4, put] = -self.volume
+        matrix[4, 4] = 0.0
+        rhs = np.empty((5 + n, count))
+        rhs[put] = -self.force
+        rhs[4] = 0.0
+        floor = None
+        if positive:
+            chord = np.maximum(self.area / self.system.film_unit, 1e-3)
+            floor = 0.1 * self.system.reference * chord
+        out = condense(matrix, rhs, 5, floor)
+        if positive:
+            out.matrix[:4, :4] = clip_to_positive(out.matrix[:4, :4])
+        clock.lap("assemble")
+        return out
+
+    def solve(
+        self,
+        condensed: Condensed,
+        vertex_shift: Floats,
+        pressure_shift: Floats,
+        volume_fault: Floats,
+    ) -> tuple[Step, Factor]:
+        """Solve [H + σ, −B; −Bᵀ, −ε](dv, dp) = (−r, V − V*), and recover the offsets.
+
+        ``vertex_shift`` (n_vertices, 2) is σ, ``pressure_shift`` (n_bubbles,) is ε.
+        """
+        system, network = self.system, self.state.network
+        pattern = system.pattern(network)
+        clock = Stopwatch(system.timings)
+        sign = np.array([1.0, 1.0, 1.0, 1.0, 1.0, -1.0])
+        rows = np.array([0, 1, 2, 3, 4, 4])
+        blocks = condensed.matrix[np.ix_(rows, rows)]
+        blocks *= (sign[:, None] * sign)[..., None]
+        shifts = np.concatenate([vertex_shift.ravel(), -pressure_shift])
+        matrix = pattern.matrix(blocks, shifts)
+        rhs = pattern.gather(condensed.rhs[rows] * sign[:, None])
+        rhs[2 * network.n_vertices :] += volume_fault
+        ordered = pattern.ordered(rhs)
+        clock.lap("assemble")
+        factor = system.factoriser.factor(matrix)
+        x = factor.solve(ordered)
+        x += factor.solve(ordered - matrix @ x)
+        clock.lap("solve")
+        solution = pattern.restored(x)
+        split = 2 * network.n_vertices
+        dv, dp = solution[:split].reshape(-1, 2), solution[split:]
+        kept = np.concatenate(
+            [dv[network.tails].T, dv[network.heads].T, (dp[network.left] - dp[network.right])[None]]
+        )
+        offsets = condensed.recover(kept).T
+        clock.lap("assemble")
+        return Step(dv, np.ascontiguousarray(offsets), dp), factor
+
+
+def one_ring(network: CellNetwork, values: Floats) -> Floats:
+    """Greatest value over each vertex and its neighbours."""
+    out = values.copy()
+    np.maximum.at(out, network.tails, values[network.heads])
+    np.maximum.at(out, network.heads, values[network.tails])
+    return out
+
+
+def pinned_unknowns(cell: HeleShawCell, points: Floats) -> Ints:
+    """Vertex unknowns (indices into (n_vertices, 2), flattened) that fix the rigid motions."""
+    from scipy.linalg import qr
+
+    modes = cell.surface.rigid_motions(points)
+    if not len(modes):
+        return np.zeros(0, dtype=np.int64)
+    frames = cell.surface.vertex_frames(points)
+    matrix = np.einsum("kvx,vix->kvi", modes, frames).reshape(len(modes), -1)
+    _, _, pivots = qr(matrix, mode="economic", pivoting=True)
+    return np.asarray(pivots[: len(modes)], dtype=np.int64)

@@ -1,0 +1,273 @@
+"""Geodesic distances on a triangle mesh by the heat method: one factorisation, many solves.
+
+The only file that calls libigl, which ends the interpreter on bad input and answers some of it
+wrongly without a word: everything is checked first.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from warpedfoam.arrays import Floats, Ints, as_indices, as_number, as_points, frozen
+from warpedfoam.errors import ConvergenceError, MeshError
+from warpedfoam.surfaces.mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from warpedfoam.surfaces.protocol import Surface
+
+#: Default diffusion time in squared mean edges.
+TIME_FACTOR = 4.0
+
+_KEPT = 4  # factorisations that `factored` remembers
+
+
+class HeatGeodesics:
+    """Geodesic distances from nodes of a closed mesh (Crane, Weischedel and Wardetzky 2013).
+
+    Heat diffuses from the sources for a time t; minus its normalised gradient is the gradient of the
+    distance, found by a Poisson equation. Both matrices are factored once, here.
+
+    Parameters
+    ----------
+    surface_or_mesh : Surface, TriangleMesh or trimesh.Trimesh
+        A surface stands for its ``.mesh``. The mesh must be one closed, consistently oriented
+        manifold of proper triangles.
+    t : float, optional
+        Diffusion time, a length squared. The default 4h², h the mean edge, beats the usual h² in
+        distances and bisectors alike.
+
+    Raises
+    ------
+    MeshError
+        If the mesh is open, in pieces, not a manifold, badly oriented or degenerate.
+    TypeError, ValueError
+        If the mesh is something else, or ``t`` is not a finite number above 0.
+
+    Notes
+    -----
+    Accuracy, on spheres of 1000 to 64 000 nodes with t = 4h²: farther than 4 edges from the source a
+    distance is low by 0.11 to 0.16 h on average (0.24 h at most); within 3 edges it is low by 3 to
+    16 % *at every refinement*: never quote it as a length without that error. The bisector of two
+    sources, placed by interpolating d1² − d2² linearly along mesh edges (never d1 − d2), is off by
+    0.01 to 0.07 h. A solve from several sources leaves a different offset, of either sign and
+    about 0.1 h, at each of them: see `distances`.
+
+    Factoring takes 0.03 s at 4000 nodes and 1.5 s at 64 000, about n^1.4; a solve 1 and 35 ms.
+
+    Examples
+    --------
+    >>> from warpedfoam.surfaces import Sphere
+    >>> heat = HeatGeodesics(Sphere(radius=1.0).triangulate(2562))
+    >>> south = int(heat.mesh.nodes[:, 2].argmin())
+    >>> north = int(heat.mesh.nodes[:, 2].argmax())
+    >>> float(heat.distances(south)[north].round(1))
+    3.1
+    """
+
+    __slots__ = ("_data", "_mesh", "_t")
+
+    def __init__(
+        self, surface_or_mesh: Surface | TriangleMesh | trimesh.Trimesh, t: float | None = None
+    ) -> None:
+        self._mesh = as_mesh(surface_or_mesh)
+        self._mesh.require_closed_surface()
+        self._t = _time(self._mesh, t)
+        self._data = _factor(self._mesh, self._t)
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The mesh that was factored."""
+        return self._mesh
+
+    @property
+    def t(self) -> float:
+        """Diffusion time."""
+        return self._t
+
+    def distances(self, sources: ArrayLike) -> Floats:
+        """Distance of every node from the nearest of the sources.
+
+        Parameters
+        ----------
+        sources : int or (k,) integer array
+            Node indices; repeats count once.
+
+        Returns
+        -------
+        (n_nodes,) array
+            With one source exactly 0 there. With several the field's mean over the sources is 0:
+            subtract the value at a node's own source to compare distances from different sources.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If ``sources`` is empty, not integers, or out of range.
+        ConvergenceError
+            If a distance is not finite: ``t`` is far too small or too large for the mesh.
+        """
+        import igl
+
+        nodes = _source_nodes(sources, self._mesh.n_nodes)
+        out: Floats = np.asarray(igl.heat_geodesics_solve(self._data, nodes), dtype=np.float64)
+        if out.shape != (self._mesh.n_nodes,) or not np.isfinite(out).all():
+            raise ConvergenceError(
+                f"the heat method gave distances that are not finite with t = {self._t:g}; "
+                f"take t near {TIME_FACTOR:g} times the squared mean edge, "
+                f"{TIME_FACTOR * self._mesh.mean_edge**2:g}"
+            )
+        return out
+
+
+def geodesic_distances(
+    surface_or_mesh: Surface | TriangleMesh | trimesh.Trimesh,
+    sources: ArrayLike,
+    t: float | None = None,
+) -> Floats:
+    """Distance of every node of a mesh from the nearest source, by the heat method.
+
+    The factorisations of the last few meshes are kept, so that repeated calls cost a solve each.
+
+    Parameters
+    ----------
+    surface_or_mesh, t
+        See `HeatGeodesics`, for its accuracy too.
+    sources : int, (k,) integer array, or (k, 3) float array
+        Integers are node indices. Floats are points on the surface: each is written as the affine
+        combination s = Σ λ_i v_i of a triangle's corners and d² = Σ λ_i (d_i² − |v_i − s|²), which
+        is exact in the plane; three solves a point.
+
+    Returns
+    -------
+    (n_nodes,) array
+
+    Raises
+    ------
+    MeshError, TypeError, ValueError, ConvergenceError
+        As `HeatGeodesics`; also ``ValueError`` if a point is farther than an edge from the mesh.
+
+    Examples
+    --------
+    >>> from warpedfoam.surfaces import Torus
+    >>> torus = Torus(major_radius=20.0, minor_radius=4.0)
+    >>> d = geodesic_distances(torus, [[24.0, 0.0, 0.0]])
+    >>> inner = torus.mesh.nodes[:, 0] > 15.9
+    >>> bool(abs(d[inner].max() - 4.0 * 3.14159) < 0.2)
+    True
+    """
+    heat = factored(surface_or_mesh, t)
+    array = np.asarray(sources)
+    if array.dtype.kind != "f":
+        return heat.distances(array)
+    points = as_points(array, "sources")
+    corners, shares = _affine(heat.mesh, points)
+    fields = {int(node): heat.distances(node) ** 2 for node in np.unique(corners)}
+    best = np.full(heat.mesh.n_nodes, np.inf)
+    for point, nodes, share in zip(points, corners, shares, strict=True):
+        lift = ((heat.mesh.nodes[nodes] - point) ** 2).sum(axis=1)
+        squared = sum(w * (fields[int(i)] - up) for i, w, up in zip(nodes, share, lift, strict=True))
+        np.minimum(best, squared, out=best)
+    out: Floats = np.sqrt(np.maximum(best, 0.0))
+    return out
+
+
+def as_mesh(surface_or_mesh: object) -> TriangleMesh:
+    """The `TriangleMesh` of a surface, a mesh or a ``trimesh.Trimesh``; a ``TypeError`` else."""
+    if isinstance(surface_or_mesh, TriangleMesh):
+        return surface_or_mesh
+    mesh = getattr(surface_or_mesh, "mesh", None)
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    if hasattr(surface_or_mesh, "faces") and hasattr(surface_or_mesh, "vertices"):
+        return TriangleMesh.from_trimesh(surface_or_mesh)  # type: ignore[arg-type]
+    raise TypeError(
+        "surface_or_mesh must be a Surface, a TriangleMesh or a trimesh.Trimesh, "
+        f"got {type(surface_or_mesh).__name__}"
+    )
+
+
+_remembered: OrderedDict[tuple[bytes, float], HeatGeodesics] = OrderedDict()
+
+
+def factored(
+    surface_or_mesh: Surface | TriangleMesh | trimesh.Trimesh, t: float | None = None
+) -> HeatGeodesics:
+    """`HeatGeodesics`, taken from the last few made if one has equal nodes, triangles and t."""
+    mesh = as_mesh(surface_or_mesh)
+    key = (_digest(mesh), _time(mesh, t))
+    found = _remembered.pop(key, None)
+    if found is None:
+        found = HeatGeodesics(mesh, t)
+    _remembered[key] = found
+    while len(_remembered) > _KEPT:
+        _remembered.popitem(last=False)
+    return found
+
+
+def _time(mesh: TriangleMesh, t: float | None) -> float:
+    if t is None:
+        return TIME_FACTOR * mesh.mean_edge**2
+    return as_number(t, "t", positive=True)
+
+
+def _digest(mesh: TriangleMesh) -> bytes:
+    state = blake2b(mesh.nodes, digest_size=16)
+    state.update(mesh.triangles)
+    return state.digest()
+
+
+def _factor(mesh: TriangleMesh, t: float) -> Any:
+    """libigl's factors; the mesh must have passed `require_closed_surface`."""
+    import igl
+
+    data = igl.HeatGeodesicsData()
+    try:
+        igl.heat_geodesics_precompute(mesh.nodes, mesh.triangles, t, data)
+    except RuntimeError as fault:
+        raise MeshError(f"the mesh's heat equation cannot be factored with t = {t:g}: {fault}") from fault
+    return data
+
+
+def _source_nodes(sources: ArrayLike, n_nodes: int) -> Ints:
+    array = np.asarray(sources)
+    if array.ndim == 0:
+        array = array.reshape(1)
+    if not array.size:
+        raise ValueError("sources is empty: name at least one node")
+    nodes = as_indices(array, "sources", (None,), below=n_nodes)
+    out: Ints = frozen(np.unique(nodes))
+    return out
+
+
+def _affine(mesh: TriangleMesh, points: Floats) -> tuple[Ints, Floats]:
+    """Corners (k, 3) of a triangle at each point's nearest node, and the affine coordinates (k, 3)."""
+    offset, node = cKDTree(mesh.nodes).query(points)
+    if (far := offset > mesh.edge_lengths.max()).any():
+        bad = int(np.flatnonzero(far)[0])
+        raise ValueError(
+            f"sources must be points on the surface, but point {bad} is {offset[bad]:g} from the nearest "
+            "node; project them first"
+        )
+    corner = np.argsort(mesh.triangles.ravel(), kind="stable")
+    first = np.searchsorted(mesh.triangles.ravel()[corner], np.arange(mesh.n_nodes + 1))
+    count = first[node + 1] - first[node]
+    which = np.repeat(np.arange(len(points)), count)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    triangle = corner[first[node][which] + place] // 3
+    a, b, c = (mesh.nodes[mesh.triangles[triangle, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    scale = (normal**2).sum(axis=1)
+    x = points[which] - a
+    beta = (np.cross(x, c - a) * normal).sum(axis=1) / scale
+    gamma = (np.cross(b - a, x) * normal).sum(axis=1) / scale
+    shares = np.stack([1.0 - beta - gamma, beta, gamma], axis=1)
+    order = np.lexsort((shares.min(axis=1), which))
+    best = order[np.cumsum(count) - 1]
+    return mesh.triangles[triangle[best]], shares[best]
