@@ -125,9 +125,9 @@ def foam(arguments):
     if not arguments or (arguments[0].startswith("-") and arguments[0] != "--help"):
         arguments = ["torus", *arguments]
     command = [tool("warpedfoam"), "foam", *arguments]
-    if os.name == "nt":
-        return subprocess.call(command)
-    os.execv(command[0], command)  # so that Ctrl-C and kill reach the job itself
+    if os.name != "nt":
+        os.execv(command[0], command)  # so that Ctrl-C and kill reach the job itself
+    return subprocess.call(command)
 
 
 def test(arguments):

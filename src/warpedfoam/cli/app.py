@@ -41,7 +41,7 @@ Volumes = Annotated[
 ]
 Order = Annotated[int, typer.Option("--order", help="Polynomial order of the films.")]
 T1 = Annotated[bool, typer.Option("--t1/--no-t1", help="Let films turn (T1) while relaxing.")]
-Color = Annotated[str, typer.Option("--color-by", help="Colour of the picture and the PLYs: charge or pressure.")]
+Color = Annotated[str, typer.Option("--color-by", help="Colour by charge, pressure, sides or area.")]
 Folder = Annotated[str, typer.Option("-o", "--out", help="Folder for the results.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no summary (but --json).")]
@@ -56,15 +56,23 @@ class Stopped(BaseException):
         self.signum = signum
 
 
-@app.callback()
-def _common(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)] = False,
-) -> None:
-    if version:
-        from importlib.metadata import version as installed
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
 
-        print(f"warpedfoam {installed('warpedfoam')}")
+        print(f"warpedfoam {version('warpedfoam')}")
         raise typer.Exit
+
+
+Version = Annotated[
+    bool,
+    typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_print_version),
+]
+
+
+@app.callback()
+def _common(version: Version = False) -> None:
+    pass  # the option's callback has done the work
 
 
 @app.command()
@@ -253,7 +261,7 @@ def _ending_well(debug: bool) -> Iterator[None]:
 def _signals() -> Iterator[None]:
     """Raise `Stopped` on SIGTERM and SIGHUP inside the block."""
 
-    def stop(signum: int, frame: FrameType | None) -> None:
+    def stop(signum: int, _: FrameType | None) -> None:
         raise Stopped(signum)
 
     names = [s for s in ("SIGTERM", "SIGHUP") if hasattr(signal, s)]

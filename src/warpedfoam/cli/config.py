@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from warpedfoam.arrays import as_choice, as_flag, as_floats, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
+from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.surfaces import Sphere, Surface, Torus
 
 Section = TypeVar("Section")
@@ -24,9 +25,9 @@ SURFACES: Mapping[str, tuple[Callable[..., Surface], Mapping[str, float]]] = {
 }
 
 
-def option(default: Any, read: Callable[[Any, str], Any]) -> Any:
-    """Return a dataclass field whose values ``read(value, name)`` checks and converts."""
-    return field(default=default, metadata={"read": read})
+def read_by(reader: Callable[[Any, str], Any]) -> Mapping[str, Any]:
+    """Return the metadata of a dataclass field whose values ``reader(value, name)`` checks and converts."""
+    return {"read": reader}
 
 
 def _at_least(minimum: int) -> Callable[[Any, str], int]:
@@ -35,6 +36,14 @@ def _at_least(minimum: int) -> Callable[[Any, str], int]:
 
 def _above_zero(value: Any, name: str) -> float:
     return as_number(value, name, positive=True)
+
+
+def _order(value: Any, name: str) -> int:
+    return as_integer(value, name, minimum=2, maximum=24)
+
+
+def _tolerance(value: Any, name: str) -> float:
+    return as_number(value, name, minimum=1e-13)
 
 
 def _one_of(*choices: str) -> Callable[[Any, str], str]:
@@ -76,45 +85,45 @@ class SurfaceOptions:
 class CellOptions:
     """The Hele-Shaw cell."""
 
-    gap: float = option(0.5, _above_zero)
+    gap: float = field(default=0.5, metadata=read_by(_above_zero))
 
 
 @dataclass(frozen=True)
 class FoamOptions:
     """What `warpedfoam.voronoi_foam` is given; None leaves it its own default."""
 
-    n_bubbles: int | None = option(None, _at_least(1))
-    seeds: Any = option("random", _seeds)
-    lloyd: int = option(0, _at_least(0))
-    volumes: Any = option(None, _volumes)
-    n_nodes: int | None = option(None, _at_least(1))
+    n_bubbles: int | None = field(default=None, metadata=read_by(_at_least(1)))
+    seeds: Any = field(default="random", metadata=read_by(_seeds))
+    lloyd: int = field(default=0, metadata=read_by(_at_least(0)))
+    volumes: Any = field(default=None, metadata=read_by(_volumes))
+    n_nodes: int | None = field(default=None, metadata=read_by(_at_least(1)))
 
 
 @dataclass(frozen=True)
 class RelaxOptions:
     """What `warpedfoam.relax` is given; None leaves it its own default."""
 
-    order: int = option(4, _at_least(2))
-    t1: bool = option(True, as_flag)
-    max_iterations: int | None = option(None, _at_least(1))
-    tolerance: float | None = option(None, _above_zero)
-    solver: str = option("auto", _one_of("auto", "superlu", "pardiso"))
+    order: int = field(default=4, metadata=read_by(_order))
+    t1: bool = field(default=True, metadata=read_by(as_flag))
+    max_iterations: int | None = field(default=None, metadata=read_by(_at_least(0)))
+    tolerance: float | None = field(default=None, metadata=read_by(_tolerance))
+    solver: str = field(default="auto", metadata=read_by(_one_of("auto", "superlu", "pardiso")))
 
 
 @dataclass(frozen=True)
 class OutputOptions:
     """Where the results go, and the picture's colours."""
 
-    folder: str = option("out", _text)
-    color_by: str = option("charge", _one_of("charge", "pressure"))
-    picture: bool = option(True, as_flag)
+    folder: str = field(default="out", metadata=read_by(_text))
+    color_by: str = field(default="charge", metadata=read_by(_one_of(*COLOR_CHOICES)))
+    picture: bool = field(default=True, metadata=read_by(as_flag))
 
 
 @dataclass(frozen=True)
 class Options:
     """Every option of the main job."""
 
-    seed: int = option(0, _at_least(0))
+    seed: int = field(default=0, metadata=read_by(_at_least(0)))
     surface: SurfaceOptions = SurfaceOptions()
     cell: CellOptions = CellOptions()
     foam: FoamOptions = FoamOptions()

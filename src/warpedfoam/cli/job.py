@@ -88,7 +88,10 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
         progress=progress,
     )
     clock.append(time.perf_counter())
-    limits = {"max_iterations": options.relax.max_iterations, "tolerance": options.relax.tolerance}
+    limits: dict[str, Any] = {
+        "max_iterations": options.relax.max_iterations,
+        "tolerance": options.relax.tolerance,
+    }
     relaxed = relax(
         start,
         order=options.relax.order,
@@ -135,6 +138,8 @@ def _write_outputs(folder: Path, foam: Foam, options: Options, progress: Progres
     from warpedfoam.io import save, write_bubbles_csv, write_films_csv, write_ply
 
     (folder / RECORD).unlink(missing_ok=True)
+    for part in folder.glob(".*.part"):  # of a run that was killed outright while writing
+        part.unlink(missing_ok=True)
     progress("write", 0.0)
     color_by = options.output.color_by
     ply, view = write_ply(folder / "foam.ply", foam, color_by=color_by)

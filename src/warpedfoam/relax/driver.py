@@ -8,12 +8,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_flag, as_integer, as_number, frozen
+from warpedfoam.arrays import as_flag, as_integer, as_number, frozen
 from warpedfoam.foam import Foam
+from warpedfoam.kernels.condense import Condensed
 from warpedfoam.moves.t1 import T1Event
 from warpedfoam.relax.linear import factoriser
 from warpedfoam.relax.result import Relaxation
-from warpedfoam.relax.sweep import SHORT, plan_sweep, realigned, turned
+from warpedfoam.relax.sweep import plan_sweep, realigned, turned
 from warpedfoam.relax.system import (
     Linearised,
     Residuals,
@@ -29,7 +30,7 @@ from warpedfoam.relax.system import (
 SOFTNESS, VOLUME_STEP = 0.02, 0.15
 #: Largest changes in one proximal step: of a vertex (in ℓ), of an offset.
 VERTEX_CAP, OFFSET_CAP = 0.3, 0.2
-#: Exact Newton starts below the first residual and is left above the second or at longer steps.
+#: Exact Newton starts below the first residual, is left above the second, and steps no farther than the third.
 EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
 
 
@@ -169,7 +170,7 @@ def _iterate(
         elif now.force > EXACT_ABOVE:
             exact = False
         if exact:
-            exact = _exact_step(run, lin)
+            _exact_step(run, lin)
         else:
             _proximal_step(run, lin)
         run.iteration += 1
@@ -196,7 +197,7 @@ def _advance(run: _Run, step: Step) -> None:
     cell, length = run.system.cell, run.system.length
     sweep = plan_sweep(cell, run.state, step, length, run.turns, t1=run.t1)
     limited = Step(step.vertices * sweep.limit[:, None], step.offsets, step.pressures)
-    state = _moved(run, limited, 1.0)
+    state = _moved(run, limited)
     if sweep.failing.size:
         state = realigned(cell, state, sweep, length)
     if sweep.turning.size:
@@ -209,68 +210,51 @@ def _advance(run: _Run, step: Step) -> None:
     clock.lap("t1")
 
 
-def _exact_step(run: _Run, lin: Linearised) -> bool:
-    """One step on the KKT system; False if the proximal steps must take over."""
+def _exact_step(run: _Run, lin: Linearised) -> None:
+    """One step on the KKT system, shifted until its inertia is right and scaled to a safe length."""
     now = lin.residuals
     shift = float(np.clip(0.05 * now.force, 1e-10, 0.03))
     condensed = lin.condensed(positive=False)
-    fault = now.volume
     while True:
-        step, right = _kkt_step(run, lin, condensed, shift, fault)
+        step, right = _kkt_step(run, lin, condensed, shift)
         if right or shift >= 1.0:
             break
         shift = max(10.0 * shift, 1e-3)
     size = max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
     if not right or not np.isfinite(size):
         _proximal_step(run, lin)
-        return False
-    if size > EXACT_STEP or _collapses(run, step):
-        _proximal_step(run, lin)
-        return False
-    run.state = _moved(run, step, 1.0)
-    return True
+        return
+    share = min(1.0, EXACT_STEP / max(size, 1e-300))
+    _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
 
 
 def _kkt_step(
-    run: _Run, lin: Linearised, condensed: object, shift: float, fault: Floats
+    run: _Run, lin: Linearised, condensed: Condensed, shift: float
 ) -> tuple[Step, bool]:
-    from warpedfoam.kernels.condense import Condensed
-
-    assert isinstance(condensed, Condensed)
+    """Newton step with shift σ on the vertices, rigid motions pinned; and whether its inertia is right."""
     network = run.state.network
     vertex = np.full(2 * network.n_vertices, shift)
     vertex[run.pins] += 1.0
     pressure = np.zeros(network.n_bubbles)
     pressure[0] = 1.0  # the volumes add up to the cell's: one constraint is redundant
-    step, factor = lin.solve(condensed, vertex.reshape(-1, 2), pressure, fault)
+    step, factor = lin.solve(condensed, vertex.reshape(-1, 2), pressure, lin.residuals.volume)
     return step, factor.n_negative == network.n_bubbles and not condensed.negative.any()
 
 
 def _is_minimum(run: _Run, lin: Linearised) -> bool:
     """Whether the Hessian at this state, rigid motions pinned, has the inertia of a minimum."""
-    _, right = _kkt_step(run, lin, lin.condensed(positive=False), 1e-10, lin.residuals.volume)
+    _, right = _kkt_step(run, lin, lin.condensed(positive=False), 1e-10)
     return right
 
 
-def _collapses(run: _Run, step: Step) -> bool:
-    """Whether a step would make a film shorter than the T1 length, and shorter than it is."""
-    network, length = run.state.network, run.system.length
-    moved = run.system.cell.surface.retract(run.state.points, length * step.vertices)
-    old = run.state.points[network.heads] - run.state.points[network.tails]
-    new = moved[network.heads] - moved[network.tails]
-    was, now = np.linalg.norm(old, axis=1), np.linalg.norm(new, axis=1)
-    against = np.einsum("fi,fi->f", old, new) < 0.0
-    return bool((((now < SHORT * length) & (now < was)) | against).any()) and run.t1
-
-
-def _moved(run: _Run, step: Step, share: float) -> State:
+def _moved(run: _Run, step: Step) -> State:
     state = run.state
     surface, length = run.system.cell.surface, run.system.length
     return State(
         state.network,
-        surface.retract(state.points, share * length * step.vertices),
-        state.offsets + share * step.offsets,
-        state.pressures + share * step.pressures,
+        surface.retract(state.points, length * step.vertices),
+        state.offsets + step.offsets,
+        state.pressures + step.pressures,
     )
 
 

@@ -1,0 +1,40 @@
+"""Defect statistics on a sphere: how many fives and sevens do random foams relax to?
+
+A sphere needs a total charge of 6 χ = 12. Twelve fives would do; a random foam has many more,
+paired with sevens: the excess.
+
+    python examples/02_defects_on_a_sphere.py [SEEDS] [BUBBLES]
+"""
+
+from __future__ import annotations
+
+import sys
+
+import warpedfoam as wf
+
+
+def main(n_seeds: int = 5, n_bubbles: int = 100) -> int:
+    """Return the sum of all charges over all seeds, 12 for each."""
+    cell = wf.HeleShawCell(wf.Sphere(radius=10.0), gap=0.5)
+    print(f"{n_bubbles} bubbles on a sphere, random starts")
+    print("seed   T1s   fours  fives  sixes  sevens  eights   excess   charge   energy")
+    total = 0
+    for seed in range(n_seeds):
+        relaxed = wf.relax(wf.voronoi_foam(cell, n_bubbles, seed=seed))
+        if not relaxed.converged:
+            raise SystemExit(f"seed {seed} did not converge: {relaxed.message}")
+        network = relaxed.foam.network
+        count = {n: int((network.sides == n).sum()) for n in range(4, 9)}
+        charge = int(network.charges.sum())
+        excess = int(abs(network.charges).sum()) - charge  # charges beyond those that topology asks for
+        print(
+            f"{seed:4d} {relaxed.n_t1:5d}   "
+            + "  ".join(f"{count[n]:5d}" for n in count)
+            + f"    {excess:5d}    {charge:5d}   {relaxed.energy:.6f}"
+        )
+        total += charge
+    return total
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))

@@ -1,0 +1,245 @@
+"""Save a foam and get the very same foam back."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import warpedfoam.surfaces as _surfaces
+from warpedfoam.arrays import as_indices
+from warpedfoam.cell import HeleShawCell
+from warpedfoam.errors import FileFormatError
+from warpedfoam.foam import Foam
+from warpedfoam.io.atomic import PathLike, as_path, atomic_binary
+from warpedfoam.network import CellNetwork
+
+FORMAT = "warpedfoam foam"
+VERSION = 1
+
+_INTS = ("next", "origin", "bubble", "bubble_euler", "bubble_ids")
+_FLOATS = ("vertex_points", "film_offsets", "target_volumes")
+_AXES = {"vertex_points": 2, "film_offsets": 2}
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def save(path: PathLike, foam: Foam) -> Path:
+    """Write ``foam`` to ``path``, an uncompressed NumPy ``.npz`` archive without pickles.
+
+    The archive holds the arrays as they are, and ``header``: JSON with the version of this schema,
+    the surface (class and fields), gap, tension and seed. The file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str or path
+        Written under exactly this name.
+    foam : Foam
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    TypeError
+        If ``foam`` is not a Foam, or its surface is not a dataclass of numbers and arrays.
+    FileNotFoundError, IsADirectoryError, ValueError
+        If the path cannot be written.
+    """
+    if not isinstance(foam, Foam):
+        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    network = foam.network
+    arrays: Arrays = {
+        "next": network.next,
+        "origin": network.origin,
+        "bubble": network.bubble,
+        "bubble_euler": network.bubble_euler,
+        "bubble_ids": foam.bubble_ids,
+        "vertex_points": foam.vertex_points,
+        "film_offsets": foam.film_offsets,
+        "target_volumes": foam.target_volumes,
+    }
+    if foam.pressures is not None:
+        arrays["pressures"] = foam.pressures
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "surface": _described(foam.cell.surface, "surface", arrays),
+        "gap": foam.cell.gap,
+        "n_heights": foam.cell.n_heights,
+        "tension": foam.tension,
+        "seed": foam.seed,
+        "pressures": foam.pressures is not None,
+    }
+    text = json.dumps(header, allow_nan=False, sort_keys=True)
+    arrays["header"] = np.frombuffer(text.encode("utf-8"), dtype=np.uint8)
+    target = as_path(path)
+    with atomic_binary(target) as stream:
+        np.savez(stream, allow_pickle=False, **arrays)
+    return target
+
+
+def load(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
+    """Read a foam that `save` wrote; its arrays are the same to the last bit.
+
+    Parameters
+    ----------
+    path : str or path
+    surfaces : iterable of classes, optional
+        Surface classes of your own that the file may name, besides those of `warpedfoam.surfaces`.
+
+    Raises
+    ------
+    TypeError
+        If ``path`` is no path.
+    FileNotFoundError
+        If there is no such file.
+    FileFormatError
+        If the file is no foam, is damaged, or is of a version or a surface that is not known here.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from warpedfoam import Foam, HeleShawCell, Sphere
+    >>> points = [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]]
+    >>> loops = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    >>> foam = Foam.from_loops(HeleShawCell(Sphere(1.0), gap=0.01), points, loops)
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> again = load(save(pathlib.Path(folder.name) / "foam.npz", foam))
+    >>> again.cell == foam.cell, again.energy == foam.energy
+    (True, True)
+    >>> folder.cleanup()
+    """
+    source = as_path(path)
+    if not source.exists():
+        raise FileNotFoundError(f"cannot read {source}: there is no such file")
+    if not source.is_file():
+        raise FileFormatError(f"cannot read {source}: it is not a file")
+    data = source.read_bytes()
+    known = {name: getattr(_surfaces, name) for name in _surfaces.__all__}
+    known.update({kind.__name__: kind for kind in surfaces})
+    try:
+        return _foam(_members(data), known)
+    except FileFormatError as fault:
+        raise FileFormatError(f"cannot read {source}: {fault}") from None
+    except Exception as fault:  # whatever a damaged file makes the parsers raise
+        raise FileFormatError(
+            f"cannot read {source}: it is no foam of warpedfoam or it is damaged ({fault})"
+        ) from fault
+
+
+def _members(data: bytes) -> Arrays:
+    """Arrays of the archive; zipfile compares the checksums of all it reads."""
+    if not zipfile.is_zipfile(io.BytesIO(data)):
+        raise FileFormatError("it is not an .npz archive, or its end is missing")
+    arrays: Arrays = {}
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for member in archive.infolist():
+            if member.compress_type != zipfile.ZIP_STORED or member.file_size > len(data):
+                raise FileFormatError(f"its member {member.filename!r} is compressed or damaged")
+            arrays[member.filename.removesuffix(".npy")] = _array(archive.read(member), member.filename)
+    return arrays
+
+
+def _array(raw: bytes, name: str) -> NDArray[Any]:
+    stream = io.BytesIO(raw)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        raise FileFormatError(f"its member {name!r} is of array format {version}, 1.0 is known")
+    shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype.kind not in "iuf" or fortran:
+        raise FileFormatError(f"its member {name!r} holds {dtype} values, not plain numbers")
+    body = raw[stream.tell() :]
+    count = 1
+    for length in shape:
+        count *= length
+    if count * dtype.itemsize != len(body):
+        raise FileFormatError(f"its member {name!r} holds {len(body)} bytes, not {count * dtype.itemsize}")
+    return np.frombuffer(body, dtype=dtype).reshape(shape)
+
+
+def _foam(arrays: Arrays, known: Mapping[str, type]) -> Foam:
+    if "header" not in arrays:
+        raise FileFormatError("it has no header: it is not a foam of warpedfoam")
+    header = json.loads(arrays["header"].tobytes().decode("utf-8"))
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise FileFormatError("its header is not that of a foam of warpedfoam")
+    if header.get("version") != VERSION:
+        raise FileFormatError(
+            f"it is of version {header.get('version')!r}, this warpedfoam reads version {VERSION}; "
+            "use a newer warpedfoam"
+        )
+    wanted = {"surface", "gap", "n_heights", "tension", "seed", "pressures"}
+    lacking = sorted(wanted - header.keys()) + sorted({*_INTS, *_FLOATS} - arrays.keys())
+    if header.get("pressures") is True and "pressures" not in arrays:
+        lacking.append("pressures")
+    if lacking:
+        raise FileFormatError(f"it lacks {', '.join(lacking)}")
+    for name in (*_INTS, *_FLOATS):
+        kinds = "i" if name in _INTS else "f"
+        if arrays[name].dtype.kind not in kinds or arrays[name].ndim != _AXES.get(name, 1):
+            raise FileFormatError(f"its array {name!r} has the wrong type or shape")
+    count = len(arrays["next"])
+    for name in ("next", "origin", "bubble"):  # before anything is allocated by the largest index
+        as_indices(arrays[name], name, (count,), below=count)
+    surface = _restored(header["surface"], "surface", arrays, known)
+    cell = HeleShawCell(surface, header["gap"], header["n_heights"])
+    network = CellNetwork(*(arrays[name] for name in ("next", "origin", "bubble", "bubble_euler")))
+    return Foam(
+        cell,
+        network,
+        arrays["vertex_points"],
+        arrays["film_offsets"],
+        arrays["target_volumes"],
+        arrays["bubble_ids"],
+        tension=header["tension"],
+        pressures=arrays["pressures"] if header["pressures"] is True else None,
+        seed=header["seed"],
+    )
+
+
+def _described(value: object, place: str, arrays: Arrays) -> dict[str, Any]:
+    """Class and fields of a dataclass for JSON; arrays go to ``arrays`` under their place."""
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        raise TypeError(f"cannot save the {place}: {type(value).__name__} is not a dataclass")
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(value):
+        if field.name.startswith("_") or not field.init:
+            continue
+        item, where = getattr(value, field.name), f"{place}.{field.name}"
+        if isinstance(item, np.ndarray) and item.dtype.kind in "iuf":
+            arrays[where] = item
+            fields[field.name] = {"array": where}
+        elif dataclasses.is_dataclass(item) and not isinstance(item, type):
+            fields[field.name] = _described(item, where, arrays)
+        elif item is None or isinstance(item, (bool, int, float, str)):
+            fields[field.name] = item
+        else:
+            raise TypeError(f"cannot save {where}: it is a {type(item).__name__}")
+    return {"class": type(value).__name__, "fields": fields}
+
+
+def _restored(entry: Any, place: str, arrays: Arrays, known: Mapping[str, type]) -> Any:
+    if not isinstance(entry, dict):
+        return entry
+    if "array" in entry:
+        return arrays[entry["array"]]
+    kind = known.get(entry["class"])
+    if kind is None or not dataclasses.is_dataclass(kind):
+        raise FileFormatError(
+            f"its {place} is a {entry['class']!r}, which is not known here; "
+            "use a newer warpedfoam, or pass its class in load(..., surfaces=[...])"
+        )
+    fields = {
+        name: _restored(item, f"{place}.{name}", arrays, known) for name, item in entry["fields"].items()
+    }
+    return kind(**fields)

@@ -1,0 +1,58 @@
+"""The mesh files in data/ are what their script makes, closed and of the right topology."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+import trimesh
+
+import warpedfoam as wf
+
+DATA = Path(__file__).parents[1] / "data"
+EULER = {"torus.ply": 0, "sphere.ply": 2}
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_meshes", DATA / "make_meshes.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def load(path: Path) -> trimesh.Trimesh:
+    mesh = trimesh.load(path, process=False)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
+
+
+def test_every_file_is_tested(script: ModuleType) -> None:
+    assert {p.name for p in DATA.glob("*.ply")} == set(EULER) == set(script.SURFACES)
+
+
+@pytest.mark.parametrize("name", EULER)
+def test_files_are_what_the_script_makes(script: ModuleType, name: str, tmp_path: Path) -> None:
+    made = {p.name: p for p in script.main(tmp_path)}[name]
+    stored, fresh = load(DATA / name), load(made)
+    np.testing.assert_array_equal(stored.faces, fresh.faces)
+    np.testing.assert_allclose(stored.vertices, fresh.vertices, rtol=0.0, atol=1e-6 * stored.scale)
+
+
+@pytest.mark.parametrize("name", EULER)
+def test_files_are_closed_surfaces(script: ModuleType, name: str) -> None:
+    path = DATA / name
+    assert path.stat().st_size < 200_000
+    mesh = wf.TriangleMesh.from_trimesh(load(path))
+    mesh.require_closed_surface()
+    assert mesh.euler_characteristic == EULER[name]
+    surface = script.SURFACES[name]
+    off = np.linalg.norm(surface.project(mesh.nodes) - mesh.nodes, axis=1).max()
+    assert off < 1e-6 * surface.size  # single precision
+    assert load(path).volume > 0.0  # triangles counter-clockwise seen from outside
+    assert mesh.area == pytest.approx(surface.area, rel=0.01)
