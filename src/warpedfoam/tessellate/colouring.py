@@ -10,7 +10,7 @@ from warpedfoam.arrays import Floats, Ints, as_number, as_points
 
 Words = NDArray[np.uint64]
 
-_PASSES = 24  # recolouring passes after the first colouring
+_PASSES = 12  # recolouring passes after the first colouring
 
 
 def colour_seeds(points: ArrayLike, radius: float) -> Ints:
@@ -19,6 +19,9 @@ def colour_seeds(points: ArrayLike, radius: float) -> Ints:
     The graph of pairs within the radius is coloured greedily, nodes of many neighbours first, all
     nodes at once that wait for no other (Jones and Plassmann); then recoloured class by class in
     other orders (Culberson's iterated greedy), which never takes more colours and mostly saves some.
+    However many seeds there are, a radius of 4, 5, 6 spacings √(area/n) takes about 28, 42, 60
+    colours for blue noise, a tenth more for random seeds; more where the radius reaches round a
+    narrow tube. 20 000 seeds at 5 spacings take 0.6 s, in proportion to the pairs within the radius.
 
     Parameters
     ----------
@@ -56,15 +59,11 @@ def colour_graph(starts: Ints, neighbours: Ints) -> Ints:
     degree = np.diff(starts)
     colours = _first_colours(starts, neighbours, np.lexsort((rng.random(len(degree)), -degree)))
     for sweep in range(_PASSES):
-        count = int(colours.max()) + 1
-        if count < 3:
+        size = np.bincount(colours)
+        if len(size) < 3:
             break
-        size = np.bincount(colours, minlength=count)
-        order = (
-            np.arange(count)[::-1],
-            np.lexsort((rng.random(count), -size)),
-            rng.permutation(count),
-        )[(0, 1, 0, 2)[sweep % 4] if sweep % 4 != 3 else 2]
+        small_first = np.lexsort((rng.random(len(size)), size))
+        order = small_first if sweep % 2 else np.arange(len(size))[::-1]
         colours = _recoloured(starts, neighbours, colours, order)
     return colours
 

@@ -10,6 +10,7 @@ from warpedfoam.arrays import Bools, Floats, Ints, as_generator, as_integer, as_
 from warpedfoam.surfaces.protocol import Surface
 
 _DARTS = 8  # candidates per blue-noise seed
+_WIDEST = 0.85  # of √(area/n): disks jammed at random are this wide
 
 
 def random_seeds(surface: Surface, n: int, rng: object) -> Floats:
@@ -77,19 +78,22 @@ def blue_noise_seeds(surface: Surface, n: int, rng: object) -> Floats:
     count, generator = as_integer(n, "n", minimum=1), as_generator(rng, "rng")
     darts = surface.random_points(_DARTS * count, generator)
     spacing = float(np.sqrt(surface.area / count))
-    low, high = 0.0, 0.85 * spacing
-    pairs, lengths = _close_pairs(darts, high)
-    chosen = np.ones(len(darts), dtype=np.bool_)
-    trial = 0.72 * spacing
-    for _ in range(7):
-        kept = _accepted(len(darts), pairs[:, lengths < trial])
-        if np.count_nonzero(kept) >= count:
-            low, chosen = trial, kept
+    pairs, lengths = _close_pairs(darts, _WIDEST * spacing)
+
+    def thinned(radius: float) -> Bools:
+        return _accepted(len(darts), pairs[:, lengths < radius])
+
+    low, high = 0.72 * spacing, _WIDEST * spacing
+    while np.count_nonzero(chosen := thinned(low)) < count:
+        low, high = 0.9 * low, low
+    for _ in range(6):
+        middle = 0.5 * (low + high)
+        if np.count_nonzero(kept := thinned(middle)) >= count:
+            low, chosen = middle, kept
         else:
-            high = trial
-        trial = 0.5 * (low + high) if low else 0.95 * trial
-    index = np.flatnonzero(chosen)
-    return darts[generator.permutation(index)[:count]]
+            high = middle
+    kept_darts: Floats = darts[generator.permutation(np.flatnonzero(chosen))[:count]]
+    return kept_darts
 
 
 def check_seeds(surface: Surface, points: ArrayLike) -> Floats:
@@ -118,9 +122,7 @@ def check_seeds(surface: Surface, points: ArrayLike) -> Floats:
     same = cKDTree(seeds).query_pairs(1e-9 * surface.size, output_type="ndarray")
     if len(same):
         first, second = sorted(int(i) for i in same[np.lexsort(same.T[::-1])[0]])
-        raise ValueError(
-            f"seeds must be distinct, but seeds {first} and {second} coincide; remove one"
-        )
+        raise ValueError(f"seeds must be distinct, but seeds {first} and {second} coincide; remove one")
     return seeds
 
 

@@ -1,0 +1,276 @@
+"""`voronoi_foam`: the geodesic Voronoi cells of seeds, as a foam."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpedfoam.arrays import Floats, Ints, as_choice, as_floats, as_generator, as_integer, as_number
+from warpedfoam.cell import HeleShawCell
+from warpedfoam.errors import ResolutionError
+from warpedfoam.foam import Foam
+from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.tessellate.fields import SeedFields, seed_fields
+from warpedfoam.tessellate.geodesics import HeatGeodesics
+from warpedfoam.tessellate.power import balanced_weights
+from warpedfoam.tessellate.regions import RegionNetwork, corner_weights, region_network, tidy_labels
+from warpedfoam.tessellate.seeds import blue_noise_seeds, check_seeds, lattice_seeds, random_seeds
+
+#: Mesh nodes per bubble, the fewest nodes of a mesh, and how often it is refined if too coarse.
+NODES_PER_BUBBLE, LEAST_NODES, REFINEMENTS = 40, 4000, 2
+SEED_KINDS = ("random", "blue", "lattice")
+
+
+def voronoi_foam(
+    cell: HeleShawCell,
+    n_bubbles: int | None = None,
+    *,
+    seeds: str | ArrayLike = "random",
+    seed: int | np.random.Generator = 0,
+    lloyd: int = 0,
+    volumes: float | ArrayLike | None = None,
+    n_nodes: int | None = None,
+    order: int = 4,
+    balance: bool = True,
+    progress: Callable[[str, float], None] | None = None,
+) -> Foam:
+    """Foam of the geodesic Voronoi cells of seeds on the cell's inner plate.
+
+    Distances come from libigl's heat method, one solve for each colour of seeds; mesh nodes go to
+    their nearest seed, films to where d² − w is equal, interpolated linearly along mesh edges. The
+    weights w (a power diagram) bring the cells close to the volumes asked for.
+
+    Parameters
+    ----------
+    cell : HeleShawCell
+    n_bubbles : int, optional
+        At least 4; not needed if ``seeds`` is an array.
+    seeds : {"random", "blue", "lattice"} or (n, 3) array, optional
+        Uniformly random points (default), blue noise, an even deterministic lattice, or points on
+        the surface.
+    seed : int or numpy.random.Generator, optional
+        Source of all randomness.
+    lloyd : int, optional
+        Sweeps that move each seed to the centre of its cell.
+    volumes : float or (n,) array, optional
+        Target volumes: equal (default), an array that adds up to the cell's volume, or the width of
+        a log-normal distribution (standard deviation of ln V).
+    n_nodes : int, optional
+        Nodes of the mesh that carries the distances; by default 40 per bubble (at least 4000),
+        refined by itself where that is too coarse.
+    order : int, optional
+        Polynomial order p of the films.
+    balance : bool, optional
+        False keeps all weights 0: plain Voronoi cells.
+    progress : callable, optional
+        Called as ``progress("build", fraction)``.
+
+    Returns
+    -------
+    Foam
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of the wrong type or out of range; volumes that do not add up.
+    ResolutionError
+        If bubbles would not be disks (too few for the surface) or the mesh is too coarse.
+
+    Examples
+    --------
+    >>> from warpedfoam import HeleShawCell, Sphere
+    >>> foam = voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), n_bubbles=12, seeds="lattice")
+    >>> int(foam.network.charges.sum())
+    12
+    """
+    if not isinstance(cell, HeleShawCell):
+        raise TypeError(f"cell must be a HeleShawCell, got {type(cell).__name__}")
+    rng = as_generator(seed)
+    points = _seed_points(cell, n_bubbles, seeds, rng)
+    count = len(points)
+    sweeps = as_integer(lloyd, "lloyd", minimum=0, maximum=1000)
+    targets = _target_volumes(cell, count, volumes, rng)
+    p = as_integer(order, "order", minimum=1, maximum=24)
+    fixed = None if n_nodes is None else as_integer(n_nodes, "n_nodes", minimum=100)
+    if fixed is not None and fixed < 6 * count:
+        raise ResolutionError(
+            f"n_nodes = {fixed} is too coarse for {count} bubbles; use at least {6 * count}, "
+            f"better {NODES_PER_BUBBLE * count}"
+        )
+    if cell.surface.euler_characteristic > 0 and count < 4:
+        raise ResolutionError(
+            f"n_bubbles must be at least 4 on a closed surface without handles, got {count}; "
+            "two hemispheres and three lunes can be built with Foam.from_loops"
+        )
+    nodes = fixed or max(LEAST_NODES, NODES_PER_BUBBLE * count)
+    attempts = 1 if fixed is not None else 1 + REFINEMENTS
+    for attempt in range(attempts):
+        try:
+            return _built(
+                cell, points, targets, nodes, sweeps, p, balance, seed if isinstance(seed, int) else None, progress
+            )
+        except ResolutionError as fault:
+            if attempt == attempts - 1:
+                raise ResolutionError(f"{fault}. {_advice(cell, count, nodes)}") from None
+            nodes *= 2
+    raise AssertionError("unreachable")
+
+
+def _built(
+    cell: HeleShawCell,
+    points: Floats,
+    targets: Floats,
+    n_nodes: int,
+    sweeps: int,
+    order: int,
+    balance: bool,
+    seed: int | None,
+    progress: Callable[[str, float], None] | None,
+) -> Foam:
+    surface, count = cell.surface, len(points)
+    mesh = surface.triangulate(n_nodes)
+    heat = HeatGeodesics(mesh)
+    spacing = float(np.sqrt(surface.area / count))
+    rounds = sweeps + 1
+
+    def fields(at: Floats, done: int) -> SeedFields:
+        told = None if progress is None else lambda share: progress("build", (done + share) / rounds)
+        return seed_fields(heat, at, spacing, told)
+
+    zero = np.zeros(count)
+    for sweep in range(sweeps):
+        labels = fields(points, sweep).labels(zero)
+        points = _centres(cell, mesh, labels, points)
+    field = fields(points, sweeps)
+    homes = np.asarray(_nearest_nodes(mesh, points))
+    weights = balanced_weights(field, targets, spacing) if balance else zero
+    labels = tidy_labels(mesh, field.labels(weights), homes)
+    try:
+        regions = region_network(mesh, labels, count)
+    except ResolutionError:
+        if not balance:
+            raise
+        weights = zero
+        labels = tidy_labels(mesh, field.labels(weights), homes)
+        regions = region_network(mesh, labels, count)
+    foam = _laid_out(cell, field, weights, labels, regions, targets, order, seed)
+    _check_areas(foam, mesh, labels)
+    return foam
+
+
+def _laid_out(
+    cell: HeleShawCell,
+    field: SeedFields,
+    weights: Floats,
+    labels: Ints,
+    regions: RegionNetwork,
+    targets: Floats,
+    order: int,
+    seed: int | None,
+) -> Foam:
+    """Vertices where three d² − w are equal, films fitted to the crossings of mesh edges."""
+    mesh, surface, network = field.mesh, cell.surface, regions.network
+    corner = mesh.triangles[regions.corners]
+    at = np.broadcast_to(corner[:, :, None], (len(corner), 3, 3))
+    to = np.broadcast_to(labels[corner][:, None, :], (len(corner), 3, 3))
+    squares, known = field.square_to(at, to)
+    place = corner_weights(squares - weights[to], known.all(axis=(1, 2)))
+    vertices = surface.project(np.einsum("mi,mix->mx", place, mesh.nodes[corner]))
+    a, b = regions.crossings.T
+    ends = np.stack([labels[a], labels[b]], axis=1)
+    at_a, known_a = field.square_to(np.stack([a, a], axis=1), ends)
+    at_b, known_b = field.square_to(np.stack([b, b], axis=1), ends)
+    gap_a = (at_a - weights[ends]) @ np.array([-1.0, 1.0])
+    gap_b = (at_b - weights[ends]) @ np.array([1.0, -1.0])
+    total = gap_a + gap_b
+    sound = known_a.all(axis=1) & known_b.all(axis=1) & (total > 0.0)
+    share = np.where(sound, np.clip(gap_a / np.where(sound, total, 1.0), 0.0, 1.0), 0.5)
+    crossings = surface.project(mesh.nodes[a] + share[:, None] * (mesh.nodes[b] - mesh.nodes[a]))
+    tail, head = vertices[network.tails], vertices[network.heads]
+    offsets = surface.arc_fit(tail, head, regions.film, crossings, order)
+    chord = np.linalg.norm(head - tail, axis=1)
+    short = chord < 0.3 * float(np.sqrt(surface.area / network.n_bubbles))
+    offsets[short] = 0.0
+    return Foam(cell, network, vertices, offsets, targets, seed=seed)
+
+
+def _check_areas(foam: Foam, mesh: TriangleMesh, labels: Ints) -> None:
+    """Compare the foam's areas with the mesh regions': a film on the wrong side of a handle shows."""
+    rough = np.bincount(labels, mesh.node_areas, minlength=foam.n_bubbles)
+    rough *= foam.cell.surface.area / mesh.area
+    mean = foam.cell.surface.area / foam.n_bubbles
+    per_node = mesh.area / mesh.n_nodes
+    allowance = 0.5 * mean + 4.0 * np.sqrt(rough * per_node)
+    if (np.abs(foam.bubble_areas - rough) > allowance).any():
+        raise ResolutionError(
+            "a film would be too long for the surface: it spans half a turn or more; use more bubbles"
+        )
+
+
+def _seed_points(
+    cell: HeleShawCell, n_bubbles: int | None, seeds: str | ArrayLike, rng: np.random.Generator
+) -> Floats:
+    surface = cell.surface
+    if isinstance(seeds, str):
+        kind = as_choice(seeds, "seeds", SEED_KINDS)
+        if n_bubbles is None:
+            raise TypeError("n_bubbles is needed unless seeds is an array of points")
+        count = as_integer(n_bubbles, "n_bubbles", minimum=1)
+        if kind == "random":
+            return random_seeds(surface, count, rng)
+        if kind == "blue":
+            return blue_noise_seeds(surface, count, rng)
+        return lattice_seeds(surface, count)
+    points = check_seeds(surface, seeds)
+    if n_bubbles is not None and as_integer(n_bubbles, "n_bubbles", minimum=1) != len(points):
+        raise ValueError(f"n_bubbles is {n_bubbles}, but seeds holds {len(points)} points; leave one out")
+    return points
+
+
+def _target_volumes(
+    cell: HeleShawCell, count: int, volumes: float | ArrayLike | None, rng: np.random.Generator
+) -> Floats:
+    if volumes is None:
+        return np.full(count, cell.volume / count)
+    if isinstance(volumes, (int, float, np.integer, np.floating)) or np.ndim(volumes) == 0:
+        width = as_number(volumes, "volumes", minimum=0.0)
+        if width > 2.0:
+            raise ValueError(f"volumes as a log-normal width must be at most 2, got {width:g}")
+        drawn = np.exp(width * rng.standard_normal(count))
+        return cell.volume * drawn / drawn.sum()
+    given = as_floats(volumes, "volumes", (count,))
+    if (given <= 0.0).any():
+        raise ValueError(f"volumes must be above 0, but bubble {int(given.argmin())} has {given.min():g}")
+    total = given.sum()
+    if abs(total - cell.volume) > 1e-9 * cell.volume:
+        raise ValueError(
+            f"volumes must add up to the cell's volume {cell.volume:.12g}, got {total:.12g}; "
+            "multiply them by cell.volume / volumes.sum()"
+        )
+    return given * (cell.volume / total)
+
+
+def _nearest_nodes(mesh: TriangleMesh, points: Floats) -> Ints:
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(mesh.nodes).query(points)[1], dtype=np.int64)
+
+
+def _centres(cell: HeleShawCell, mesh: TriangleMesh, labels: Ints, points: Floats) -> Floats:
+    """Area-weighted mean of each region's nodes, on the surface; an empty region keeps its seed."""
+    count = len(points)
+    total = np.bincount(labels, mesh.node_areas, minlength=count)
+    sums = [np.bincount(labels, mesh.node_areas * mesh.nodes[:, k], minlength=count) for k in range(3)]
+    mean = np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
+    return cell.surface.project(np.where((total > 0.0)[:, None], mean, points))
+
+
+def _advice(cell: HeleShawCell, count: int, n_nodes: int) -> str:
+    # a bubble must not reach a third of the way round the tightest curve: 2π / k_max
+    _, sharpest = cell.surface.curvature_range()
+    least = int(np.ceil(cell.surface.area * (3.0 * sharpest / (2.0 * np.pi)) ** 2))
+    if count < least:
+        return f"Use about {least} bubbles or more (now {count})"
+    return f"Use n_nodes = {4 * n_nodes} or more (tried {n_nodes}), or seeds that are more even"

@@ -1,0 +1,88 @@
+"""Squared distances from every mesh node to its nearest seeds, by coloured heat solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warpedfoam.arrays import Bools, Floats, Ints
+from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.tessellate.colouring import colour_seeds
+from warpedfoam.tessellate.geodesics import HeatGeodesics
+
+#: Nearest seeds kept per node, and how far apart (in mean spacings) seeds of one colour lie.
+CANDIDATES, APART = 12, 4.5
+
+
+@dataclass(frozen=True, eq=False)
+class SeedFields:
+    """``seeds`` (n_nodes, k): the seeds nearest to each node; ``squares`` (n_nodes, k): d² to them."""
+
+    mesh: TriangleMesh
+    seeds: Ints
+    squares: Floats
+
+    def labels(self, weights: Floats) -> Ints:
+        """Seed that owns each node: least d² − w."""
+        best = np.argmin(self.squares - weights[self.seeds], axis=1)
+        return self.seeds[np.arange(len(best)), best]
+
+    def square_to(self, nodes: Ints, seeds: Ints) -> tuple[Floats, Bools]:
+        """d² from nodes to seeds (same shape), and whether it is known."""
+        hit = self.seeds[nodes] == seeds[..., None]
+        found = hit.any(axis=-1)
+        place = np.argmax(hit, axis=-1)
+        return np.take_along_axis(self.squares[nodes], place[..., None], axis=-1)[..., 0], found
+
+
+def seed_fields(
+    heat: HeatGeodesics,
+    seeds: Floats,
+    spacing: float,
+    progress: Callable[[float], None] | None = None,
+) -> SeedFields:
+    """Solve once per colour and keep, for every node, d² to its nearest seeds.
+
+    A solve measures from the mesh node next to each seed. Its value at that node is taken off (a
+    solve for many sources leaves a different offset at each), and the seed's distance from the node
+    enters by the difference of the squared chords.
+
+    Parameters
+    ----------
+    heat : HeatGeodesics
+    seeds : (n, 3) array
+        On the surface, distinct.
+    spacing : float
+        Mean distance of neighbouring seeds.
+    progress : callable, optional
+        Called with the fraction done after each solve.
+    """
+    nodes = heat.mesh.nodes
+    count = min(CANDIDATES, len(seeds))
+    chord, near = cKDTree(seeds).query(nodes, k=count, workers=-1)
+    chord, near = chord.reshape(len(nodes), count), near.reshape(len(nodes), count)
+    _, source = cKDTree(nodes).query(seeds)
+    source = np.asarray(source, dtype=np.int64)
+    colours = colour_seeds(seeds, APART * spacing)
+    # seeds that share a source node must not share a solve: they do not, being close together
+    order = np.argsort(colours[near.ravel()], kind="stable")
+    n_colours = int(colours.max()) + 1
+    bounds = np.searchsorted(colours[near.ravel()][order], np.arange(n_colours + 1))
+    by_colour = np.argsort(colours, kind="stable")
+    first = np.searchsorted(colours[by_colour], np.arange(n_colours + 1))
+    squares = np.empty(near.size)
+    for colour in range(n_colours):
+        members = by_colour[first[colour] : first[colour + 1]]
+        field = heat.distances(source[members])
+        take = order[bounds[colour] : bounds[colour + 1]]
+        seed = near.ravel()[take]
+        distance = np.maximum(field[take // count] - field[source[seed]], 0.0)
+        squares[take] = distance**2
+        if progress is not None:
+            progress((colour + 1) / n_colours)
+    shift = nodes[:, None, :] - nodes[source[near]]
+    squares = squares.reshape(near.shape) + chord**2 - np.einsum("nki,nki->nk", shift, shift)
+    return SeedFields(heat.mesh, near.astype(np.int64), squares)

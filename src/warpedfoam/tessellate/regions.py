@@ -1,0 +1,168 @@
+"""From labelled mesh nodes to a cell network: films are chains of two-coloured mesh edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from warpedfoam.arrays import Bools, Floats, Ints
+from warpedfoam.errors import ResolutionError
+from warpedfoam.network import CellNetwork
+from warpedfoam.surfaces.mesh import TriangleMesh
+
+
+@dataclass(frozen=True, eq=False)
+class RegionNetwork:
+    """A network read off a mesh: ``corners`` (n_vertices,) are the triangles of three labels, in vertex
+    order; ``crossings`` (m, 2) the two-coloured mesh edges and ``film`` (m,) the film each lies on."""
+
+    network: CellNetwork
+    corners: Ints
+    crossings: Ints
+    film: Ints
+
+
+def tidy_labels(mesh: TriangleMesh, labels: Ints, homes: Ints) -> Ints:
+    """Give every region its home node, and every island of a region to the regions round it.
+
+    ``homes`` (n_regions,) are the nodes nearest to the seeds; a region that owns no node takes its
+    home. Islands are the pieces of a region that do not hold its largest part.
+    """
+    count = len(homes)
+    owned = np.bincount(labels, minlength=count)
+    missing = np.flatnonzero(owned == 0)
+    if missing.size:
+        homes_free = owned[labels[homes[missing]]] > 1
+        labels = labels.copy()
+        labels[homes[missing[homes_free]]] = missing[homes_free]
+    for _ in range(20):
+        island = _islands(mesh, labels, count)
+        if not island.any():
+            break
+        labels = _absorbed(mesh, labels, island)
+    return labels
+
+
+def _islands(mesh: TriangleMesh, labels: Ints, count: int) -> Bools:
+    a, b = mesh.edges.T
+    same = labels[a] == labels[b]
+    n = mesh.n_nodes
+    graph = coo_array((np.ones(int(same.sum())), (a[same], b[same])), shape=(n, n))
+    n_pieces, piece = connected_components(graph, directed=False)
+    if n_pieces == count:
+        return np.zeros(n, dtype=np.bool_)
+    sizes = np.bincount(piece)
+    owner = np.empty(n_pieces, dtype=np.int64)
+    owner[piece] = labels
+    order = np.lexsort((sizes, owner))
+    main = np.zeros(n_pieces, dtype=np.bool_)
+    main[order[np.append(np.flatnonzero(np.diff(owner[order])), n_pieces - 1)]] = True
+    out: Bools = ~main[piece]
+    return out
+
+
+def _absorbed(mesh: TriangleMesh, labels: Ints, island: Bools) -> Ints:
+    a, b = np.concatenate([mesh.edges, mesh.edges[:, ::-1]]).T
+    use = island[a] & ~island[b]
+    out = labels.copy()
+    out[a[use]] = labels[b[use]]
+    return out
+
+
+def region_network(mesh: TriangleMesh, labels: Ints, count: int) -> RegionNetwork:
+    """Network of labelled regions, each of which must be a disk.
+
+    The dual of a triangle mesh is threefold, so triangles of three labels are vertices and chains of
+    two-coloured edges between them are films.
+
+    Raises
+    ------
+    ResolutionError
+        If a region is empty, in pieces or not a disk, or fewer than two vertices exist.
+    """
+    _require_disks(mesh, labels, count)
+    tri = mesh.triangles
+    corner = labels[tri]
+    threefold = (
+        (corner[:, 0] != corner[:, 1]) & (corner[:, 1] != corner[:, 2]) & (corner[:, 2] != corner[:, 0])
+    )
+    vertices = np.flatnonzero(threefold)
+    if len(vertices) < 2:
+        raise ResolutionError(
+            f"{count} bubbles meet nowhere in threefold vertices; use more bubbles (at least 4 on a sphere)"
+        )
+    # two-coloured edges, linked through the triangles that have exactly two of them
+    n = mesh.n_nodes
+    crossing = mesh.edges[labels[mesh.edges[:, 0]] != labels[mesh.edges[:, 1]]]
+    keys = crossing[:, 0] * n + crossing[:, 1]
+    start, end = tri, np.roll(tri, -1, axis=1)
+    edge_key = np.minimum(start, end) * n + np.maximum(start, end)
+    two = labels[start] != labels[end]
+    place = np.minimum(np.searchsorted(keys, edge_key), len(keys) - 1)
+    pair = np.flatnonzero((two.sum(axis=1) == 2) & ~threefold)
+    linked = place[pair][two[pair]].reshape(-1, 2)
+    graph = coo_array((np.ones(len(linked)), (linked[:, 0], linked[:, 1])), shape=(len(keys),) * 2)
+    _, chain = connected_components(graph, directed=False)
+    # ends of chains: the three edges of each threefold triangle
+    ends = chain[place[vertices]].ravel()
+    order = np.argsort(ends, kind="stable")
+    film_of, tally = np.unique(ends, return_counts=True)
+    if (tally != 2).any():
+        raise ResolutionError("a film has no two ends; use more mesh nodes (n_nodes)")
+    half = np.empty(3 * len(vertices), dtype=np.int64)
+    half[order] = np.arange(len(order))
+    film_index = np.full(int(chain.max()) + 1, -1, dtype=np.int64)
+    film_index[film_of] = np.arange(len(film_of))
+    if (film_index[chain] < 0).any():
+        raise ResolutionError("two bubbles share a closed film; use more bubbles")
+    # leaving the triangle through its edge i → j, the label at j is on the left
+    corner_labels = corner[vertices]
+    left = np.roll(corner_labels, -1, axis=1).ravel()
+    half_of = half.reshape(-1, 3)
+    origin = np.empty(len(half), dtype=np.int64)
+    bubble = np.empty(len(half), dtype=np.int64)
+    following = np.empty(len(half), dtype=np.int64)
+    origin[half] = np.repeat(np.arange(len(vertices)), 3)
+    bubble[half] = left
+    # arriving with bubble(i) on the left, go on through the edge before: k → i
+    following[half_of ^ 1] = np.roll(half_of, 1, axis=1)
+    network = CellNetwork(following, origin, bubble)
+    return RegionNetwork(network, vertices, crossing, film_index[chain])
+
+
+def _require_disks(mesh: TriangleMesh, labels: Ints, count: int) -> None:
+    nodes = np.bincount(labels, minlength=count)
+    if (nodes == 0).any():
+        raise ResolutionError(
+            f"{int((nodes == 0).sum())} of {count} bubbles own no mesh node; use more nodes (n_nodes)"
+        )
+    a, b = labels[mesh.edges].T
+    edges = np.bincount(a[a == b], minlength=count)
+    x, y, z = labels[mesh.triangles].T
+    triangles = np.bincount(x[(x == y) & (y == z)], minlength=count)
+    euler = nodes - edges + triangles
+    if _islands(mesh, labels, count).any() or (euler != 1).any():
+        bad = int((euler != 1).sum())
+        raise ResolutionError(
+            f"{bad} of {count} bubbles would not be disks: too few bubbles for the surface (a bubble "
+            "must not reach round it), or too few mesh nodes"
+        )
+
+
+def corner_weights(squares: Floats, known: Bools) -> Floats:
+    """Barycentric place (m, 3) in each triangle where the three d² − w are equal, kept inside.
+
+    ``squares`` (m, 3, 3): at node i of the triangle, d² − w to the region of node j.
+    """
+    # differences are linear over the triangle: solve λ·(s0 − s1) = 0, λ·(s0 − s2) = 0, Σ λ = 1
+    first = squares[:, :, 0] - squares[:, :, 1]
+    second = squares[:, :, 0] - squares[:, :, 2]
+    weight = np.cross(first, second)
+    total = weight.sum(axis=1, keepdims=True)
+    sound = known & (np.abs(total[:, 0]) > 1e-300)
+    weight = np.where(sound[:, None], weight / np.where(sound[:, None], total, 1.0), 1.0 / 3.0)
+    weight = np.clip(weight, 0.05, None)
+    return weight / weight.sum(axis=1, keepdims=True)

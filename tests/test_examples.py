@@ -1,0 +1,43 @@
+"""Every example runs and returns the number that it should."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def example(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_example_is_tested() -> None:
+    assert {p.stem for p in EXAMPLES.glob("*.py")} == {
+        "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply",
+    }  # fmt: skip
+
+
+def test_first_foam_on_a_torus(tmp_path: Path) -> None:
+    energy = example("01_first_foam_torus").main(tmp_path)
+    assert energy == pytest.approx(0.0, rel=1e-6)
+    assert (tmp_path / "torus.png").stat().st_size > 10_000
+
+
+def test_defects_on_a_sphere(capsys: pytest.CaptureFixture[str]) -> None:
+    assert example("02_defects_on_a_sphere").main(n_seeds=3, n_bubbles=60) == 36
+    assert len(capsys.readouterr().out.splitlines()) == 5
+
+
+def test_export_ply(tmp_path: Path) -> None:
+    assert example("03_export_ply").main(tmp_path) == pytest.approx(0.0, rel=1e-3)
+    names = {"foam.ply", "foam_view.ply", "foam.npz", "bubbles.csv", "films.csv"}
+    assert {p.name for p in tmp_path.iterdir()} == names

@@ -1,0 +1,149 @@
+"""The package as a whole: light to import, its layers complete, its papers in agreement."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+HEAVY = {
+    "matplotlib", "trimesh", "igl", "networkx", "rich", "typer", "click", "pyvista", "pypardiso",
+    "scipy.spatial", "scipy.optimize", "scipy.stats", "pandas", "tomllib",
+}  # fmt: skip
+
+
+def modules_after(statement: str) -> set[str]:
+    code = f"{statement}; import sys; print('\\n'.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_import_is_light() -> None:
+    assert HEAVY & modules_after("import warpedfoam") == set()
+
+
+def test_command_answers_without_loading_the_machinery() -> None:
+    loaded = modules_after("import warpedfoam.cli.app")
+    assert {"matplotlib", "trimesh", "igl", "networkx"} & loaded == set()
+
+
+def test_every_module_has_its_layer() -> None:
+    contracts = {c["id"]: c for c in PROJECT["tool"]["importlinter"]["contracts"]}
+    layers = [
+        {name.strip(" ()") for name in layer.split("|")} for layer in contracts["layers"]["layers"]
+    ]
+    source = ROOT / "src" / "warpedfoam"
+    present = {p.stem for p in source.glob("*.py") if p.stem != "__init__"}
+    present |= {p.parent.name for p in source.glob("*/__init__.py")}
+    assert present <= set().union(*layers)
+    assert set().union(*layers) - present <= {"studies"}  # to come
+    place = {name: i for i, layer in enumerate(layers) for name in layer}
+    order = ["cli", "plot", "studies", "relax", "energy", "foam", "cell", "surfaces", "kernels", "arrays"]
+    assert [place[name] for name in order] == list(range(len(layers) - 1))
+    siblings = ({"tessellate", "energy", "moves", "analysis", "io"}, {"surfaces", "network"})
+    assert all(group in layers for group in siblings)
+    assert contracts["layers"]["exhaustive"] is True
+
+
+def test_papers_agree_on_the_version() -> None:
+    number = PROJECT["project"]["version"]
+    assert version("warpedfoam") == number
+    assert f"\nversion: {number}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {number}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert "MIT License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
+
+
+def test_readme_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    code = text.split("```python\n")[1].split("```")[0]
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert names["relaxed"].converged
+    assert names["relaxed"].foam.network.charges.sum() == 0
+    assert (tmp_path / "foam.ply").exists()
+
+
+def test_readme_names_files_that_exist() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    links = [part.split(")")[0] for part in text.split("](")[1:]]
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+@pytest.fixture
+def run_script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("run_script", ROOT / "run.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_run_script_is_readable_by_old_pythons_and_needs_nothing(run_script: ModuleType) -> None:
+    source = (ROOT / "run.py").read_text(encoding="utf-8")
+    tree = ast.parse(source, feature_version=(3, 7))
+    imported = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
+    assert {name.split(".")[0] for name in imported} <= sys.stdlib_module_names
+    assert not any(isinstance(node, (ast.JoinedStr, ast.ImportFrom)) for node in ast.walk(tree))
+    wanted = PROJECT["project"]["requires-python"]
+    assert wanted == ">={}.{}".format(*run_script.OLDEST)
+
+
+def test_run_script_refuses_old_pythons(
+    run_script: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run_script, "OLDEST", (99, 0))
+    with pytest.raises(SystemExit) as end:
+        run_script.use_new_enough_python()
+    assert end.value.code == 2
+    assert "needs Python 99.0 or newer" in capsys.readouterr().err
+
+
+def test_run_script_installs_once_per_project_file(
+    run_script: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    calls: list[list[str]] = []
+
+    def pretend(command: list[str], **_: object) -> int:
+        calls.append(command)
+        return 0
+
+    (tmp_path / "pyproject.toml").write_text("one")
+    (tmp_path / ".venv").mkdir()
+    monkeypatch.setattr(run_script, "HERE", str(tmp_path))
+    monkeypatch.setattr(run_script, "STAMP", str(tmp_path / ".venv" / "stamp"))
+    monkeypatch.setattr(run_script, "PYTHON", sys.executable)
+    monkeypatch.setattr(run_script.subprocess, "call", pretend)
+
+    def installs() -> int:
+        return sum("install" in command for command in calls)
+
+    run_script.install("[dev]")
+    assert installs() == 1
+    run_script.install("[dev]")
+    run_script.install()
+    assert installs() == 1
+    (tmp_path / "pyproject.toml").write_text("two")
+    run_script.install()
+    assert installs() == 2
+    run_script.install("[dev]")
+    assert installs() == 3
+
+
+def test_run_script_explains_itself() -> None:
+    done = subprocess.run([sys.executable, str(ROOT / "run.py")], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "run.py foam" in done.stderr
+    assert "run.py test" in done.stderr
