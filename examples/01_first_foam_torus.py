@@ -1,7 +1,7 @@
 """A first foam on a torus: build it, relax it, look at it.
 
-Fives (charge +1) gather on the outer half, where the Gaussian curvature is positive, sevens on the
-inner half; the charges add up to 6 χ = 0.
+More fives (charge +1) settle on the outer half, where the Gaussian curvature is positive, more sevens
+(charge −1) on the inner half; all charges add up to 6 χ = 0.
 
     python examples/01_first_foam_torus.py [FOLDER]
 """
@@ -22,7 +22,7 @@ def main(folder: str | Path) -> float:
     """Return the energy of the relaxed foam."""
     torus = wf.Torus(major_radius=20.0, minor_radius=4.0)
     cell = wf.HeleShawCell(torus, gap=0.5)
-    foam = wf.voronoi_foam(cell, n_bubbles=200, seeds="lattice")
+    foam = wf.voronoi_foam(cell, n_bubbles=200, seed=0)
     relaxed = wf.relax(foam)
     if not relaxed.converged:
         raise SystemExit(f"not converged: {relaxed.message}")

@@ -1,7 +1,7 @@
 """Defect statistics on a sphere: how many fives and sevens do random foams relax to?
 
-A sphere needs a total charge of 6 χ = 12. Twelve fives would do; a random foam has many more,
-paired with sevens: the excess.
+A sphere needs a total charge of 6 χ = 12. Twelve fives would do; a random foam has many more charges,
+in pairs of opposite sign: the excess.
 
     python examples/02_defects_on_a_sphere.py [SEEDS] [BUBBLES]
 """
@@ -13,11 +13,11 @@ import sys
 import warpedfoam as wf
 
 
-def main(n_seeds: int = 5, n_bubbles: int = 100) -> int:
-    """Return the sum of all charges over all seeds, 12 for each."""
+def main(n_seeds: int = 5, n_bubbles: int = 100) -> float:
+    """Return the mean number of excess pairs."""
     cell = wf.HeleShawCell(wf.Sphere(radius=10.0), gap=0.5)
     print(f"{n_bubbles} bubbles on a sphere, random starts")
-    print("seed   T1s   fours  fives  sixes  sevens  eights   excess   charge   energy")
+    print("seed   T1s   fours  fives  sixes  sevens  eights  excess  charge    energy")
     total = 0
     for seed in range(n_seeds):
         relaxed = wf.relax(wf.voronoi_foam(cell, n_bubbles, seed=seed))
@@ -26,14 +26,16 @@ def main(n_seeds: int = 5, n_bubbles: int = 100) -> int:
         network = relaxed.foam.network
         count = {n: int((network.sides == n).sum()) for n in range(4, 9)}
         charge = int(network.charges.sum())
-        excess = int(abs(network.charges).sum()) - charge  # charges beyond those that topology asks for
+        excess = (int(abs(network.charges).sum()) - charge) // 2  # pairs beyond the twelve that topology asks for
         print(
-            f"{seed:4d} {relaxed.n_t1:5d}   "
-            + "  ".join(f"{count[n]:5d}" for n in count)
-            + f"    {excess:5d}    {charge:5d}   {relaxed.energy:.6f}"
+            f"{seed:4d} {relaxed.n_t1:5d}   {count[4]:5d}  {count[5]:5d}  {count[6]:5d}  {count[7]:6d}  "
+            f"{count[8]:6d}  {excess:6d}  {charge:6d}  {relaxed.energy:8.3f}"
         )
-        total += charge
-    return total
+        if charge != 12:
+            raise SystemExit(f"seed {seed}: the charges add up to {charge}, not to 12")
+        total += excess
+    print(f"mean excess {total / n_seeds:.2f} pairs")
+    return total / n_seeds
 
 
 if __name__ == "__main__":

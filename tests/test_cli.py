@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import signal
@@ -251,6 +252,19 @@ def test_overrides_take_toml_values_and_bare_words(toml: Path) -> None:
 def test_defaults_are_the_same_with_and_without_a_file() -> None:
     example = Path(__file__).parents[1] / "examples" / "foam.toml"
     assert read_options(example).as_mapping() == options_from({}, "nothing").as_mapping()
+
+
+def test_defaults_are_those_of_python() -> None:
+    from warpedfoam.relax import relax
+    from warpedfoam.tessellate import voronoi_foam
+
+    options = options_from({}, "nothing").as_mapping()
+    for function, section in ((relax, "relax"), (voronoi_foam, "foam")):
+        parameters = inspect.signature(function).parameters
+        for name, value in options[section].items():
+            if name not in ("order", "n_bubbles"):
+                assert value == parameters[name].default, name
+    assert options["relax"]["order"] == inspect.signature(voronoi_foam).parameters["order"].default
 
 
 def test_seeds_given_one_by_one_set_the_number_of_bubbles(tmp_path: Path) -> None:

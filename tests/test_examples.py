@@ -28,16 +28,17 @@ def test_every_example_is_tested() -> None:
 
 def test_first_foam_on_a_torus(tmp_path: Path) -> None:
     energy = example("01_first_foam_torus").main(tmp_path)
-    assert energy == pytest.approx(0.0, rel=1e-6)
+    assert energy == pytest.approx(786.5229784, rel=1e-6)
     assert (tmp_path / "torus.png").stat().st_size > 10_000
 
 
 def test_defects_on_a_sphere(capsys: pytest.CaptureFixture[str]) -> None:
-    assert example("02_defects_on_a_sphere").main(n_seeds=3, n_bubbles=60) == 36
-    assert len(capsys.readouterr().out.splitlines()) == 5
+    excess = example("02_defects_on_a_sphere").main(n_seeds=3, n_bubbles=60)
+    assert excess == pytest.approx(14.0, abs=2.0)  # of an ensemble: a T1 may go either way elsewhere
+    assert len(capsys.readouterr().out.splitlines()) == 6
 
 
 def test_export_ply(tmp_path: Path) -> None:
-    assert example("03_export_ply").main(tmp_path) == pytest.approx(0.0, rel=1e-3)
+    assert example("03_export_ply").main(tmp_path) == pytest.approx(0.99961, abs=2e-4)
     names = {"foam.ply", "foam_view.ply", "foam.npz", "bubbles.csv", "films.csv"}
     assert {p.name for p in tmp_path.iterdir()} == names

@@ -101,12 +101,12 @@ class FoamOptions:
 
 @dataclass(frozen=True)
 class RelaxOptions:
-    """What `warpedfoam.relax` is given; None leaves it its own default."""
+    """What `warpedfoam.relax` is given; the defaults are its own."""
 
     order: int = field(default=4, metadata=read_by(_order))
     t1: bool = field(default=True, metadata=read_by(as_flag))
-    max_iterations: int | None = field(default=None, metadata=read_by(_at_least(0)))
-    tolerance: float | None = field(default=None, metadata=read_by(_tolerance))
+    max_iterations: int = field(default=1000, metadata=read_by(_at_least(0)))
+    tolerance: float = field(default=1e-10, metadata=read_by(_tolerance))
     solver: str = field(default="auto", metadata=read_by(_one_of("auto", "superlu", "pardiso")))
 
 

@@ -67,7 +67,7 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
     OSError
         If the folder cannot be written.
     """
-    from warpedfoam.io import versions
+    from warpedfoam.io import versions, write_record
     from warpedfoam.relax import relax
     from warpedfoam.tessellate import voronoi_foam
 
@@ -88,20 +88,17 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
         progress=progress,
     )
     clock.append(time.perf_counter())
-    limits: dict[str, Any] = {
-        "max_iterations": options.relax.max_iterations,
-        "tolerance": options.relax.tolerance,
-    }
     relaxed = relax(
         start,
         order=options.relax.order,
         t1=options.relax.t1,
+        max_iterations=options.relax.max_iterations,
+        tolerance=options.relax.tolerance,
         solver=options.relax.solver,
         progress=progress,
-        **{name: value for name, value in limits.items() if value is not None},
     )
     clock.append(time.perf_counter())
-    outputs = _write_outputs(folder, relaxed.foam, options, progress)
+    outputs = _write_outputs(folder, relaxed, options, progress)
     clock.append(time.perf_counter())
     record = {
         **_results(start, relaxed),
@@ -117,7 +114,7 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
         "outputs": {name: str(path) for name, path in outputs.items()},
     }
     record = _plain(record)
-    _write_record(folder / RECORD, record)
+    write_record(folder / RECORD, record)
     progress("write", 1.0)
     return Job(relaxed, record)
 
@@ -134,9 +131,12 @@ def _folder(name: str) -> Path:
     return folder
 
 
-def _write_outputs(folder: Path, foam: Foam, options: Options, progress: Progress) -> dict[str, Path]:
+def _write_outputs(
+    folder: Path, relaxed: Relaxation, options: Options, progress: Progress
+) -> dict[str, Path]:
     from warpedfoam.io import save, write_bubbles_csv, write_films_csv, write_ply
 
+    foam = relaxed.foam
     (folder / RECORD).unlink(missing_ok=True)
     for part in folder.glob(".*.part"):  # of a run that was killed outright while writing
         part.unlink(missing_ok=True)
@@ -157,17 +157,12 @@ def _write_outputs(folder: Path, foam: Foam, options: Options, progress: Progres
     if options.output.picture:
         from warpedfoam.plot import save_picture
 
-        save_picture(picture, foam, color_by=color_by)
+        title = None if relaxed.converged else f"NOT CONVERGED: {foam.n_bubbles} bubbles"
+        save_picture(picture, foam, color_by=color_by, title=title)
         paths["picture"] = picture
     else:
         picture.unlink(missing_ok=True)
     return {**paths, "record": folder / RECORD}
-
-
-def _write_record(path: Path, record: Mapping[str, Any]) -> None:
-    from warpedfoam.io import write_record
-
-    write_record(path, record)
 
 
 def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
@@ -197,7 +192,7 @@ def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
         "n_t1": relaxed.n_t1,
         "t1": {
             "count": relaxed.n_t1,
-            "energy_change": float(sum(e.energy_after - e.energy_before for e in relaxed.events)),
+            "local_energy_change": float(sum(e.energy_after - e.energy_before for e in relaxed.events)),
             "events": [asdict(event) for event in relaxed.events],
         },
     }

@@ -16,12 +16,9 @@ COLOR_CHOICES = ("charge", "pressure", "sides", "area")
 
 # Hexagons are pale; fewer sides (q > 0) red, more sides (q < 0) blue, darker away from zero.
 CHARGE_RANGE = 3
-_CHARGES = ("#0b2f63", "#2166ac", "#6fb1de", "#ececea", "#ee8a5f", "#c5321f", "#7a0c16")
-# Perceptually even, monotonic in lightness.
-RAMP = (
-    "#440154", "#482475", "#414487", "#355f8d", "#2a788e", "#21918c",
-    "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725",
-)  # fmt: skip
+_CHARGES = ("#163f80", "#2f78bd", "#7db9e2", "#ececea", "#ee8a5f", "#cc3d28", "#8c1322")
+# Monotonic in lightness; the darkest still tells from the films.
+RAMP = ("#414487", "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725")
 OUTSIDE_COLOUR = "#c4c4c4"
 FILM_COLOUR = "#1b1b1f"
 
@@ -79,10 +76,7 @@ def bubble_colours(foam: Foam, color_by: str = "charge") -> BubbleColours:
     else:
         values, label = foam.network.charges.astype(np.float64), "charge q = 6 − n"
     low, high = float(values[inside].min()), float(values[inside].max())
-    if name == "charge":
-        rgb = charge_rgb(values)
-    else:
-        rgb = ramp_rgb(values, (low, high))
+    rgb = charge_rgb(values) if name == "charge" else ramp_rgb(values, (low, high))
     rgb[~inside] = as_rgb(OUTSIDE_COLOUR)
     return BubbleColours(name, label, frozen(values), frozen(rgb), (low, high), frozen(inside))
 
@@ -93,7 +87,7 @@ def charge_rgb(charges: Floats) -> Bytes:
     Examples
     --------
     >>> charge_rgb(np.array([1.0, -9.0])).tolist()
-    [[238, 138, 95], [11, 47, 99]]
+    [[238, 138, 95], [22, 63, 128]]
     """
     table = np.stack([as_rgb(c) for c in _CHARGES])
     place = np.clip(np.round(charges), -CHARGE_RANGE, CHARGE_RANGE).astype(np.int64) + CHARGE_RANGE
@@ -107,7 +101,7 @@ def ramp_rgb(values: Floats, limits: tuple[float, float]) -> Bytes:
     Examples
     --------
     >>> ramp_rgb(np.array([0.0, 1.0]), (0.0, 1.0)).tolist()
-    [[68, 1, 84], [253, 231, 37]]
+    [[65, 68, 135], [253, 231, 37]]
     """
     low, high = limits
     # limits that differ by round-off only are one value

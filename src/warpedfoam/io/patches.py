@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -46,12 +47,15 @@ class Patches:
         True for the points of the strips along the films.
     triangles : (m, 3) array of int
         Counter-clockwise seen from outside.
+    sunk : (k,) array of int
+        Bubbles filled by triangles a little below the surface, which reach under their neighbours.
     """
 
     points: Floats
     point_bubble: Ints
     point_rim: Bools
     triangles: Ints
+    sunk: Ints
 
     @property
     def triangle_bubble(self) -> Ints:
@@ -113,9 +117,7 @@ def loop_points(network: CellNetwork, chains: Ints) -> tuple[Ints, Ints, Ints]:
     return rows.ravel(), loops.sizes * rows.shape[1], network.bubble[loops.halves[loops.starts]]
 
 
-def bubble_patches(
-    foam: Foam, *, curve_points: int = 9, rings: int = 4, rim_width: float = 0.0
-) -> Patches:
+def bubble_patches(foam: Foam, *, curve_points: int = 9, rings: int = 4, rim_width: float = 0.0) -> Patches:
     """Fill every bubble with rings of triangles between its films and its middle.
 
     Rays run along the surface from the middle to each boundary point, so the patch bends with the
@@ -152,7 +154,8 @@ def bubble_patches(
     large = foam.bubble_areas[bubble] > _LARGE * foam.cell.surface.area
     patches: list[Patches] = []
     left = disk
-    for near, allowed, count in ((True, ~large, n_rings), (True, disk, _MANY_RINGS), (False, disk, _MANY_RINGS)):
+    tries = ((True, ~large, n_rings), (True, disk, _MANY_RINGS), (False, disk, _MANY_RINGS))
+    for near, allowed, count in tries:
         tried = left & allowed
         if not tried.any():
             continue
@@ -164,7 +167,7 @@ def bubble_patches(
     unfilled = np.unique(bubble[left | ~disk])
     if unfilled.size:
         nodes, owner, triangles = remainder(foam, unfilled)
-        patches.append(Patches(nodes, owner, np.zeros(len(nodes), dtype=bool), triangles))
+        patches.append(Patches(nodes, owner, np.zeros(len(nodes), dtype=bool), triangles, unfilled))
     return _joined(patches)
 
 
@@ -208,7 +211,7 @@ def _fan(foam: Foam, outline: _Outline, middles: Floats, rings: int, width: floa
     offsets = n_loops + n * np.arange(len(layers))
     triangles = [np.stack([loop, offsets[0] + here, offsets[0] + after], axis=1)]
     seam = rings - 1 if width else -1
-    for k, (a, b) in enumerate(zip(offsets[:-1], offsets[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(offsets)):
         if k != seam:
             triangles.append(np.stack([a + here, b + here, b + after], axis=1))
             triangles.append(np.stack([a + here, b + after, a + after], axis=1))
@@ -220,6 +223,7 @@ def _fan(foam: Foam, outline: _Outline, middles: Floats, rings: int, width: floa
         np.concatenate([outline.bubble, np.tile(outline.bubble[loop], len(layers))]),
         rim,
         np.concatenate(triangles),
+        outline.bubble[:0],
     )
 
 
@@ -240,7 +244,11 @@ def _kept(fan: Patches, good: Bools) -> Patches:
         return fan
     place = np.cumsum(point) - 1
     return Patches(
-        fan.points[point], fan.point_bubble[point], fan.point_rim[point], place[fan.triangles[triangle]]
+        fan.points[point],
+        fan.point_bubble[point],
+        fan.point_rim[point],
+        place[fan.triangles[triangle]],
+        fan.sunk,
     )
 
 
@@ -251,4 +259,5 @@ def _joined(parts: list[Patches]) -> Patches:
         frozen(np.concatenate([p.point_bubble for p in parts])),
         frozen(np.concatenate([p.point_rim for p in parts])),
         frozen(np.concatenate([p.triangles + s for p, s in zip(parts, shift, strict=True)])),
+        frozen(np.concatenate([p.sunk for p in parts])),
     )

@@ -66,7 +66,8 @@ def write_ply(
     view = writable_path(target.with_name(target.stem + "_view.ply"))
     colours = bubble_colours(foam, color_by)
     many = foam.n_bubbles > 2000
-    points = (5 if many else 9) if curve_points is None else as_integer(curve_points, "curve_points", minimum=2)
+    default = 5 if many else 9
+    points = default if curve_points is None else as_integer(curve_points, "curve_points", minimum=2)
     _write_network(target, foam, colours, points)
     _write_view(view, foam, colours, points, rings=2 if many else 4)
     return target, view
@@ -117,12 +118,11 @@ def _write_network(path: Path, foam: Foam, colours: BubbleColours, curve_points:
         stream.write(_lines("%d %d %d %d %d %.17g %.17g\n", columns))
 
 
-def _face_scalars(
-    foam: Foam, colours: BubbleColours
-) -> tuple[list[tuple[str, str]], list[NDArray[Any]]]:
+def _face_scalars(foam: Foam, colours: BubbleColours) -> tuple[list[tuple[str, str]], list[NDArray[Any]]]:
     """Names and PLY types of the faces' properties, and a value per bubble of each."""
     network = foam.network
-    kinds = [("red", "uchar"), ("green", "uchar"), ("blue", "uchar"), ("area", "double"), ("volume", "double")]
+    kinds = [(name, "uchar") for name in ("red", "green", "blue")]
+    kinds += [("area", "double"), ("volume", "double")]
     columns: list[NDArray[Any]] = [*colours.rgb.T, foam.bubble_areas, foam.bubble_volumes]
     if foam.pressures is not None:
         kinds.append(("pressure", "double"))
@@ -137,7 +137,9 @@ def _cut(
 ) -> tuple[Ints, Ints, Ints, Floats]:
     """Cut loops of too many corners into sectors round a middle point each."""
     span = MOST_CORNERS - 2
-    loops, owners, middles = [], [], []
+    loops: list[Ints] = []
+    owners: list[int] = []
+    middles: list[Floats] = []
     # a plain loop: it runs over the few bubbles with hundreds of corners, the rest is split in one go
     for loop, owner in zip(np.split(places, np.cumsum(sizes)[:-1]), bubble.tolist(), strict=True):
         if len(loop) <= MOST_CORNERS:
@@ -176,12 +178,9 @@ def _polygon_lines(
 
 def _write_view(path: Path, foam: Foam, colours: BubbleColours, curve_points: int, rings: int) -> None:
     patches = bubble_patches(foam, curve_points=curve_points, rings=rings, rim_width=_STRIP)
-    vertices = np.empty(
-        len(patches.points),
-        dtype=[(n, "<f4") for n in ("x", "y", "z", "nx", "ny", "nz")]
-        + [(n, "u1") for n in ("red", "green", "blue")]
-        + [("quality", "<f4")],
-    )
+    fields = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+    fields += [("red", "u1"), ("green", "u1"), ("blue", "u1"), ("quality", "<f4")]
+    vertices = np.empty(len(patches.points), dtype=fields)
     normals = foam.cell.surface.normals(patches.points)
     rgb = np.where(patches.point_rim[:, None], as_rgb(FILM_COLOUR), colours.rgb[patches.point_bubble])
     for k, axis in enumerate("xyz"):
@@ -193,13 +192,12 @@ def _write_view(path: Path, foam: Foam, colours: BubbleColours, curve_points: in
     faces = np.empty(len(patches.triangles), dtype=[("count", "u1"), ("corners", "<i4", (3,))])
     faces["count"] = 3
     faces["corners"] = patches.triangles
-    kinds = {"<f4": "float", "|u1": "uchar"}
     header = (
         "ply\n"
         "format binary_little_endian 1.0\n"
         f"comment bubbles of a foam coloured by {colours.name}, written by warpedfoam\n"
         f"element vertex {len(vertices)}\n"
-        + "".join(f"property {kinds[kind]} {name}\n" for name, kind in vertices.dtype.descr)
+        + "".join(f"property {'float' if kind == '<f4' else 'uchar'} {name}\n" for name, kind in fields)
         + f"element face {len(faces)}\n"
         "property list uchar int vertex_indices\n"
         "end_header\n"

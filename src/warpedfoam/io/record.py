@@ -55,9 +55,7 @@ def write_record(path: PathLike, record: Mapping[str, Any]) -> Path:
     """
     if not isinstance(record, Mapping):
         raise TypeError(f"record must be a mapping, got {type(record).__name__}")
-    text = json.dumps(
-        _plain(record, "record"), allow_nan=False, ensure_ascii=False, indent=2, sort_keys=True
-    )
+    text = json.dumps(_plain(record, "record"), allow_nan=False, ensure_ascii=False, indent=2, sort_keys=True)
     target = as_path(path)
     with atomic_text(target) as stream:
         stream.write(text + "\n")

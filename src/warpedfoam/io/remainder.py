@@ -14,7 +14,7 @@ from warpedfoam.foam import Foam
 _SAMPLES = 24
 _N_NODES = 10_000
 # How deep the triangles lie below the surface, in mesh edges: neighbours' patches hide the overlap.
-_DEPTH = 0.3
+_DEPTH = 0.1
 
 
 def remainder(foam: Foam, bubbles: Ints) -> tuple[Floats, Ints, Ints]:
@@ -44,7 +44,7 @@ def remainder(foam: Foam, bubbles: Ints) -> tuple[Floats, Ints, Ints]:
     across = np.cross(surface.normals(samples), ahead - samples)
     on_left = np.einsum("ni,ni->n", across[nearest], mesh.nodes - samples[nearest]) >= 0.0
     side = np.where(on_left, network.left[film[nearest]], network.right[film[nearest]])
-    close = distance < 2.0 * mesh.mean_edge
+    close = np.asarray(distance < 2.0 * mesh.mean_edge)
     close[np.argmin(distance)] = True
     a, b = mesh.edges.T
     graph = coo_array((mesh.edge_lengths, (a, b)), shape=(mesh.n_nodes, mesh.n_nodes)).tocsr()
@@ -57,9 +57,7 @@ def remainder(foam: Foam, bubbles: Ints) -> tuple[Floats, Ints, Ints]:
     keep = inside.any(axis=1)
     corner, inside = corner[keep], inside[keep]
     chosen = corner[np.arange(len(corner)), np.argmax(inside, axis=1)]
-    keys, place = np.unique(
-        chosen[:, None] * mesh.n_nodes + mesh.triangles[keep], return_inverse=True
-    )
+    keys, place = np.unique(chosen[:, None] * mesh.n_nodes + mesh.triangles[keep], return_inverse=True)
     nodes = mesh.nodes[keys % mesh.n_nodes]
     sunk = nodes - _DEPTH * mesh.mean_edge * surface.normals(nodes)
     return sunk, keys // mesh.n_nodes, place.reshape(-1, 3)

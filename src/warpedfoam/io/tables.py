@@ -102,10 +102,8 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
 
 def _energy_shares(foam: Foam) -> Floats:
     """Half of each film's energy to the bubble on either side: both halves if they are one bubble."""
-    shares: Floats = np.bincount(
-        foam.network.bubble, np.repeat(0.5 * foam.tension * foam.film_areas, 2), minlength=foam.n_bubbles
-    )
-    return shares
+    halves: Floats = np.repeat(0.5 * foam.tension * foam.film_areas, 2)
+    return np.bincount(foam.network.bubble, halves, minlength=foam.n_bubbles).astype(np.float64)
 
 
 def _or_blank(values: Floats | None, count: int) -> list[Any]:

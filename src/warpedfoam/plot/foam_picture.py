@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ def plot_foam(
     color_by: str = "charge",
     *,
     view: tuple[float, float] | None = None,
-    size: tuple[float, float] = (8.0, 6.5),
+    size: tuple[float, float] = (9.0, 6.2),
     title: str | None = None,
 ) -> Figure:
     """Draw the bubbles as curved patches and the films as lines, hidden parts left out.
@@ -97,7 +98,7 @@ def plot_foam(
     axes.set_axis_off()
     _paint(axes, foam, patches, colours, axes_of_view, segments)
     if colours.name in ("charge", "sides"):
-        _legend(axes, foam, colours)
+        _legend(figure, foam, colours)
     else:
         _colour_bar(figure, axes, colours)
     axes.set_title(_heading(foam) if title is None else title, fontsize=13)
@@ -110,7 +111,7 @@ def save_picture(
     color_by: str = "charge",
     *,
     view: tuple[float, float] | None = None,
-    size: tuple[float, float] = (8.0, 6.5),
+    size: tuple[float, float] = (9.0, 6.2),
     title: str | None = None,
     dpi: int = 160,
 ) -> Path:
@@ -138,13 +139,15 @@ def save_picture(
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
     """
+    from matplotlib import rc_context
+
     target = writable_path(path, suffixes=_FORMATS)
     dots = as_integer(dpi, "dpi", minimum=20, maximum=2400)
     figure = plot_foam(foam, color_by, view=view, size=size, title=title)
     kind = target.suffix.lower().removeprefix(".")
-    # no dates: the same foam gives the same file
+    # no dates and no random names: the same foam gives the same file
     metadata: dict[str, Any] = {} if kind == "png" else {"CreationDate" if kind == "pdf" else "Date": None}
-    with atomic_binary(target) as stream:
+    with atomic_binary(target) as stream, rc_context({"svg.hashsalt": "warpedfoam"}):
         figure.savefig(stream, format=kind, dpi=dots, metadata=metadata)
     return target
 
@@ -186,22 +189,26 @@ def _paint(
     towards = view.project(surface.normals(middles))[:, 2] > 0.0
     flat = view.project(curves)
     pieces = np.stack([flat[:, :-1], flat[:, 1:]], axis=2).reshape(-1, 2, 3)[towards]
-    # each piece is painted after the triangles beside it: nearer by about their size
-    reach = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1)
-    lift = np.maximum(reach, float(np.median(reach)) if len(reach) else 0.0)
+    # each piece is painted after the triangles beside it: lifted by the depth that these span
+    span = np.zeros(foam.n_bubbles)
+    np.maximum.at(span, patches.triangle_bubble[seen], np.ptp(corners[:, :, 2], axis=1))
+    beside = np.maximum(span[foam.network.left], span[foam.network.right])
+    lift = np.repeat(beside, segments)[towards] + np.ptp(pieces[:, :, 2], axis=1)
     closed = np.concatenate([pieces, pieces[:, :1]], axis=1)
 
-    depth = np.concatenate([corners[:, :, 2].mean(axis=1), pieces[:, :, 2].mean(axis=1) + lift])
+    owner = patches.triangle_bubble[seen]
+    below = np.where(np.isin(owner, patches.sunk), 2.0 * span[owner], 0.0)
+    depth = np.concatenate([corners[:, :, 2].mean(axis=1) - below, pieces[:, :, 2].mean(axis=1) + lift])
     order = back_to_front(depth)
     ink = as_rgb(FILM_COLOUR) / 255.0
     n_fill, n_ink = len(corners), len(closed)
     paths = np.concatenate([corners[:, :, :2], closed[:, :, :2]])[order]
     faces = np.concatenate([fill, np.tile(ink, (n_ink, 1))])[order]
     # a hairline of its own colour closes the seams between triangles
-    widths = np.concatenate([np.full(n_fill, 0.35), np.full(n_ink, _film_width(foam.n_bubbles))])[order]
+    widths = np.concatenate([np.full(n_fill, 0.5), np.full(n_ink, _film_width(foam.n_bubbles))])[order]
     axes.add_collection(
         PolyCollection(
-            paths,
+            list(paths),
             facecolors=faces,
             edgecolors=faces,
             linewidths=widths,
@@ -223,19 +230,24 @@ def _film_width(n_bubbles: int) -> float:
 
 
 def _heading(foam: Foam) -> str:
-    kind = type(foam.cell.surface).__name__
-    article = "an" if kind[0] in "AEIOU" else "a"
-    return f"{foam.n_bubbles} bubbles on {article} {kind} · energy {foam.energy:.6g}"
+    kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(foam.cell.surface).__name__).lower()
+    article = "an" if kind[0] in "aeiou" else "a"
+    count = int((foam.network.bubble_euler == 1).sum())
+    return f"{count} bubble{'' if count == 1 else 's'} on {article} {kind} · energy {foam.energy:.6g}"
 
 
-def _legend(axes: Axes, foam: Foam, colours: BubbleColours) -> None:
+def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
     """One entry per number of sides that occurs, with how many bubbles have it."""
     from matplotlib.patches import Patch
 
     sides, counts = np.unique(foam.network.sides[colours.inside], return_counts=True)
     by_charge = colours.name == "charge"
     entries: list[tuple[Floats, str]] = []
-    rgb = charge_rgb(6.0 - sides) if by_charge else ramp_rgb(sides.astype(np.float64), colours.limits)
+    rgb = (
+        charge_rgb((6 - sides).astype(np.float64))
+        if by_charge
+        else ramp_rgb(sides.astype(np.float64), colours.limits)
+    )
     ends = np.clip(sides, 6 - CHARGE_RANGE, 6 + CHARGE_RANGE) if by_charge else sides
     for end in np.unique(ends):
         same = ends == end
@@ -248,11 +260,10 @@ def _legend(axes: Axes, foam: Foam, colours: BubbleColours) -> None:
     outside = int((~colours.inside).sum())
     if outside:
         entries.append((as_rgb(OUTSIDE_COLOUR) / 255.0, f"exterior:  {outside}"))
-    axes.legend(
+    figure.legend(
         handles=[Patch(facecolor=tuple(c), edgecolor="#555555", linewidth=0.6, label=t) for c, t in entries],
         title="sides n, charge q = 6 − n:  bubbles" if by_charge else "sides n:  bubbles",
-        loc="center left",
-        bbox_to_anchor=(1.0, 0.5),
+        loc="outside right center",
         frameon=False,
         fontsize=11,
         title_fontsize=11,
@@ -276,4 +287,4 @@ def _colour_bar(figure: Figure, axes: Axes, colours: BubbleColours) -> None:
     bar = figure.colorbar(ScalarMappable(Normalize(low, high), ramp), ax=axes, shrink=0.7, pad=0.03)
     bar.set_label(colours.label, fontsize=12)
     bar.ax.tick_params(labelsize=11)
-    bar.outline.set_linewidth(0.6)  # type: ignore[operator]
+    bar.outline.set_linewidth(0.6)

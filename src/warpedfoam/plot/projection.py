@@ -26,8 +26,8 @@ class View:
 
         Examples
         --------
-        >>> View.from_angles(0.0, 0.0).axes.round(12).tolist()
-        [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+        >>> View.from_angles(0.0, 0.0).axes.round().astype(int).tolist()
+        [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
         """
         e, a = np.radians(as_floats([elevation, azimuth], "view", (2,)))
         towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -48,7 +48,7 @@ def facing(corners: Floats) -> Floats:
 
 
 def shades(normals: Floats) -> Floats:
-    """Brightness (n,) of surfaces with projected unit ``normals`` (n, 3): mild, so that colours stay legible."""
+    """Brightness (n,) of surfaces with projected unit ``normals`` (n, 3), mild to keep colours legible."""
     light = np.clip(normals @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
     out: Floats = _AMBIENT + (1.0 - _AMBIENT) * light
     return out

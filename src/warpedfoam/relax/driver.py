@@ -187,7 +187,8 @@ def _proximal_step(run: _Run, lin: Linearised) -> None:
     step, _ = lin.solve(condensed, np.repeat(shift[:, None], 2, axis=1), softness, fault)
     size = np.linalg.norm(step.vertices, axis=1, keepdims=True)
     vertices = step.vertices * np.minimum(1.0, VERTEX_CAP / np.maximum(size, 1e-300))
-    offsets = np.clip(step.offsets, -OFFSET_CAP, OFFSET_CAP)
+    bend = np.abs(step.offsets).max(axis=1, initial=0.0, keepdims=True)
+    offsets = step.offsets * np.minimum(1.0, OFFSET_CAP / np.maximum(bend, 1e-300))
     _advance(run, Step(vertices, offsets, step.pressures))
 
 

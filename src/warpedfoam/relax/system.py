@@ -21,6 +21,10 @@ from warpedfoam.relax.linear import Factor, Factoriser
 from warpedfoam.relax.pattern import Pattern
 
 
+#: Least stiffness of an offset in a proximal step, relative to a straight film of the same length.
+STIFFNESS_FLOOR = 0.5
+
+
 class Stopwatch:
     """Adds the seconds since it was last read to a kind of work."""
 
@@ -171,8 +175,9 @@ class Linearised:
         rhs[4] = 0.0
         floor = None
         if positive:
+            # a wiggling film is softer than a straight one, and Newton's step then overshoots for ever
             chord = np.maximum(self.area / self.system.film_unit, 1e-3)
-            floor = 0.1 * self.system.reference * chord
+            floor = STIFFNESS_FLOOR * self.system.reference * chord
         out = condense(matrix, rhs, 5, floor)
         if positive:
             out.matrix[:4, :4] = clip_to_positive(out.matrix[:4, :4])

@@ -13,8 +13,7 @@ from warpedfoam.errors import ResolutionError
 from warpedfoam.foam import Foam
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.tessellate.fields import SeedFields, seed_fields
-from warpedfoam.tessellate.geodesics import HeatGeodesics
-from warpedfoam.tessellate.power import balanced_weights
+from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR, HeatGeodesics
 from warpedfoam.tessellate.regions import RegionNetwork, corner_weights, region_network, tidy_labels
 from warpedfoam.tessellate.seeds import blue_noise_seeds, check_seeds, lattice_seeds, random_seeds
 
@@ -33,14 +32,13 @@ def voronoi_foam(
     volumes: float | ArrayLike | None = None,
     n_nodes: int | None = None,
     order: int = 4,
-    balance: bool = True,
     progress: Callable[[str, float], None] | None = None,
 ) -> Foam:
     """Foam of the geodesic Voronoi cells of seeds on the cell's inner plate.
 
     Distances come from libigl's heat method, one solve for each colour of seeds; mesh nodes go to
-    their nearest seed, films to where d² − w is equal, interpolated linearly along mesh edges. The
-    weights w (a power diagram) bring the cells close to the volumes asked for.
+    their nearest seed, films to where d² is equal, interpolated linearly along mesh edges. The
+    cells' volumes are what they are; `warpedfoam.relax` brings them to the volumes asked for.
 
     Parameters
     ----------
@@ -62,8 +60,6 @@ def voronoi_foam(
         refined by itself where that is too coarse.
     order : int, optional
         Polynomial order p of the films.
-    balance : bool, optional
-        False keeps all weights 0: plain Voronoi cells.
     progress : callable, optional
         Called as ``progress("build", fraction)``.
 
@@ -109,7 +105,7 @@ def voronoi_foam(
     for attempt in range(attempts):
         try:
             return _built(
-                cell, points, targets, nodes, sweeps, p, balance, seed if isinstance(seed, int) else None, progress
+                cell, points, targets, nodes, sweeps, p, seed if isinstance(seed, int) else None, progress
             )
         except ResolutionError as fault:
             if attempt == attempts - 1:
@@ -125,13 +121,12 @@ def _built(
     n_nodes: int,
     sweeps: int,
     order: int,
-    balance: bool,
     seed: int | None,
     progress: Callable[[str, float], None] | None,
 ) -> Foam:
     surface, count = cell.surface, len(points)
     mesh = surface.triangulate(n_nodes)
-    heat = HeatGeodesics(mesh)
+    heat = HeatGeodesics(mesh, t=COLOUR_TIME_FACTOR * mesh.mean_edge**2)
     spacing = float(np.sqrt(surface.area / count))
     rounds = sweeps + 1
 
@@ -139,23 +134,12 @@ def _built(
         told = None if progress is None else lambda share: progress("build", (done + share) / rounds)
         return seed_fields(heat, at, spacing, told)
 
-    zero = np.zeros(count)
     for sweep in range(sweeps):
-        labels = fields(points, sweep).labels(zero)
-        points = _centres(cell, mesh, labels, points)
+        points = _centres(cell, mesh, fields(points, sweep).labels(), points)
     field = fields(points, sweeps)
-    homes = np.asarray(_nearest_nodes(mesh, points))
-    weights = balanced_weights(field, targets, spacing) if balance else zero
-    labels = tidy_labels(mesh, field.labels(weights), homes)
-    try:
-        regions = region_network(mesh, labels, count)
-    except ResolutionError:
-        if not balance:
-            raise
-        weights = zero
-        labels = tidy_labels(mesh, field.labels(weights), homes)
-        regions = region_network(mesh, labels, count)
-    foam = _laid_out(cell, field, weights, labels, regions, targets, order, seed)
+    labels = tidy_labels(mesh, field.labels(), _nearest_nodes(mesh, points))
+    regions = region_network(mesh, labels, count)
+    foam = _laid_out(cell, field, labels, regions, targets, order, seed)
     _check_areas(foam, mesh, labels)
     return foam
 
@@ -163,27 +147,26 @@ def _built(
 def _laid_out(
     cell: HeleShawCell,
     field: SeedFields,
-    weights: Floats,
     labels: Ints,
     regions: RegionNetwork,
     targets: Floats,
     order: int,
     seed: int | None,
 ) -> Foam:
-    """Vertices where three d² − w are equal, films fitted to the crossings of mesh edges."""
+    """Vertices where three d² are equal, films fitted to the crossings of mesh edges."""
     mesh, surface, network = field.mesh, cell.surface, regions.network
     corner = mesh.triangles[regions.corners]
     at = np.broadcast_to(corner[:, :, None], (len(corner), 3, 3))
     to = np.broadcast_to(labels[corner][:, None, :], (len(corner), 3, 3))
     squares, known = field.square_to(at, to)
-    place = corner_weights(squares - weights[to], known.all(axis=(1, 2)))
+    place = corner_weights(squares, known.all(axis=(1, 2)))
     vertices = surface.project(np.einsum("mi,mix->mx", place, mesh.nodes[corner]))
     a, b = regions.crossings.T
     ends = np.stack([labels[a], labels[b]], axis=1)
     at_a, known_a = field.square_to(np.stack([a, a], axis=1), ends)
     at_b, known_b = field.square_to(np.stack([b, b], axis=1), ends)
-    gap_a = (at_a - weights[ends]) @ np.array([-1.0, 1.0])
-    gap_b = (at_b - weights[ends]) @ np.array([1.0, -1.0])
+    gap_a = at_a @ np.array([-1.0, 1.0])
+    gap_b = at_b @ np.array([1.0, -1.0])
     total = gap_a + gap_b
     sound = known_a.all(axis=1) & known_b.all(axis=1) & (total > 0.0)
     share = np.where(sound, np.clip(gap_a / np.where(sound, total, 1.0), 0.0, 1.0), 0.5)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from warpedfoam.arrays import Floats, Ints, as_number, as_points
+from warpedfoam.arrays import Ints, as_number, as_points
 
 Words = NDArray[np.uint64]
 

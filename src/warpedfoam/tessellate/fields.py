@@ -25,9 +25,9 @@ class SeedFields:
     seeds: Ints
     squares: Floats
 
-    def labels(self, weights: Floats) -> Ints:
-        """Seed that owns each node: least d² − w."""
-        best = np.argmin(self.squares - weights[self.seeds], axis=1)
+    def labels(self) -> Ints:
+        """Seed that owns each node: least d²."""
+        best = np.argmin(self.squares, axis=1)
         return self.seeds[np.arange(len(best)), best]
 
     def square_to(self, nodes: Ints, seeds: Ints) -> tuple[Floats, Bools]:

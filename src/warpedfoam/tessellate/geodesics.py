@@ -11,7 +11,7 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Floats, Ints, as_indices, as_number, as_points, frozen
@@ -29,10 +29,10 @@ TIME_FACTOR = 4.0
 #: The same for solves from many sources, one in each colour of `colouring.colour_seeds`.
 COLOUR_TIME_FACTOR = 1.0
 
-_LEAST_FACTOR = 0.01  # of the squared mean edge: below, heat dies out before it crosses the mesh
-_GREATEST_FACTOR = 1e6  # of the area: above, the mass matrix drowns in round-off
+# below 0.1 squared mean edges heat dies out on its way, above 10⁶ areas the matrix has no mass left
+_LEAST_FACTOR, _GREATEST_FACTOR = 0.1, 1e6
 
-_KEPT = 4  # factorisations that `factored` remembers
+_KEPT = 2  # factorisations that `factored` remembers
 
 
 class HeatGeodesics:
@@ -47,8 +47,8 @@ class HeatGeodesics:
         A surface stands for its ``.mesh``. The mesh must be one closed, consistently oriented
         manifold of proper triangles.
     t : float, optional
-        Diffusion time, a length squared, from 0.01 h² to 10⁶ times the area; h is the mean edge. The
-        default `TIME_FACTOR` h² = 4h² suits one source. For many, h² is better (see Notes).
+        Diffusion time, a length squared, from 0.1 h² to 10⁶ areas, h being the mean edge. The default
+        `TIME_FACTOR` h² = 4h² suits one source; for many, h² is better (see Notes).
 
     Raises
     ------
@@ -56,20 +56,26 @@ class HeatGeodesics:
         If the mesh is open, in pieces, not a manifold, badly oriented or degenerate.
     TypeError, ValueError
         If the mesh is something else, or ``t`` is not a number in its range.
+    ConvergenceError
+        If a trial solve falls far short of straight distances, as with a ``t`` so small for an uneven
+        mesh that heat dies out before it has crossed it.
 
     Notes
     -----
     Accuracy, on spheres of 1000 to 64 000 nodes with t = 4h²: farther than 4 edges from the source a
-    distance is low by 0.11 to 0.16 h on average (0.24 h at most); within 3 edges it is low by 3 to
-    16 % *at every refinement*: never quote it as a length without that error. The bisector of two
-    sources, placed by interpolating d1² − d2² linearly along mesh edges (never d1 − d2), is off by
-    0.006 h on average 7 edges from them, by 0.04 h 40 edges away.
+    distance is low by 0.11 to 0.16 h on average (0.24 h at most), but by up to 1 h where paths from
+    two sides meet (the inner equator of a torus, seen from the outer); within 3 edges it is low by 3
+    to 16 % *at every refinement* (23 % if the nodes are jittered): never quote it as a length without
+    that error. The bisector of two sources, placed by interpolating d1² − d2² linearly along mesh
+    edges (never d1 − d2), is off by 0.006 h on average 7 edges from them, by 0.04 h 40 edges away.
 
-    A solve from several sources is off by a constant round each of them, because the field is
-    smoothed over √t where their regions meet: up to 0.25 h with t = h² and 0.5 h with 4h², for
-    regions of 25 edges. Subtract the value at the source, and take t = h² (`COLOUR_TIME_FACTOR`):
-    with equal colours 5 spacings apart, the bisectors of 400 to 3000 seeds are then off by 0.02 h
-    on average and 0.2 h at most; with 4h² by twice as much.
+    One solve from several sources smooths the field over √t where their regions meet, which shifts it
+    by a constant round each source (up to 0.25 h with t = h², 0.5 h with 4h²) and by more towards
+    the seams (up to 1.5 and 3 h). Where that matters take the minimum of one solve a source, as
+    `geodesic_distances` does. Near the sources the shift hardly varies: with equal colours 5 spacings
+    apart, t = h² (`COLOUR_TIME_FACTOR`) and the value at its source taken off each region, the
+    bisectors of 400 to 3000 seeds are off by 0.02 h on average and 0.2 h at most; with 4h² by twice
+    as much.
 
     Factoring takes 0.03 s at 4000 nodes and 1.5 s at 64 000, about n^1.4; a solve 1 and 35 ms.
 
@@ -92,6 +98,7 @@ class HeatGeodesics:
         self._mesh.require_closed_surface()
         self._t = _time(self._mesh, t)
         self._data = _factor(self._mesh, self._t)
+        self._try_out()
 
     @property
     def mesh(self) -> TriangleMesh:
@@ -114,8 +121,8 @@ class HeatGeodesics:
         Returns
         -------
         (n_nodes,) array
-            With one source exactly 0 there. With several only its mean over the sources is 0, and it
-            may be a little negative: subtract the value at a node's own source.
+            From one solve. With one source 0 there; with several only its mean over the sources is 0, so
+            that it may be a little negative, and it is less accurate (see `HeatGeodesics`).
 
         Raises
         ------
@@ -129,12 +136,24 @@ class HeatGeodesics:
         nodes = _source_nodes(sources, self._mesh.n_nodes)
         out: Floats = np.asarray(igl.heat_geodesics_solve(self._data, nodes), dtype=np.float64)
         if out.shape != (self._mesh.n_nodes,) or not np.isfinite(out).all():
-            raise ConvergenceError(
-                f"the heat method gave distances that are not finite with t = {self._t:g}; "
-                f"take t near {TIME_FACTOR:g} times the squared mean edge, "
-                f"{TIME_FACTOR * self._mesh.mean_edge**2:g}"
-            )
+            raise ConvergenceError(f"the heat method gave distances that are not finite; {self._advice()}")
         return out
+
+    def _try_out(self) -> None:
+        """Refuse a t whose distances are shorter than straight lines by more than a fifth and 2 edges."""
+        nodes = self._mesh.nodes
+        source = int(((nodes - nodes[0]) ** 2).sum(axis=1).argmax())
+        straight = np.linalg.norm(nodes - nodes[source], axis=1)
+        short = 0.8 * straight - 2.0 * self._mesh.edge_lengths.max() - self.distances(source)
+        if short[worst := int(short.argmax())] > 0.0:
+            raise ConvergenceError(
+                f"the heat method puts nodes {source} and {worst} closer together than the straight line "
+                f"between them, {straight[worst]:.3g}; {self._advice()}"
+            )
+
+    def _advice(self) -> str:
+        best = TIME_FACTOR * self._mesh.mean_edge**2
+        return f"t = {self._t:g} is too small or too large, take about {best:.3g}"
 
 
 def geodesic_distances(
@@ -151,9 +170,10 @@ def geodesic_distances(
     surface_or_mesh, t
         See `HeatGeodesics`, for its accuracy too.
     sources : int, (k,) integer array, or (k, 3) float array
-        Integers are node indices. Floats are points on the surface: each is written as the affine
-        combination s = Σ λ_i v_i of a triangle's corners and d² = Σ λ_i (d_i² − |v_i − s|²), which
-        is exact in the plane; three solves a point.
+        Integers are node indices, with one solve each: `HeatGeodesics.distances` does many in one,
+        less accurately. Floats are points on the surface: each is written as the affine combination
+        s = Σ λ_i v_i of a triangle's corners and d² = Σ λ_i (d_i² − |v_i − s|²), which is exact in
+        the plane; three solves a point.
 
     Returns
     -------
@@ -174,17 +194,18 @@ def geodesic_distances(
     True
     """
     heat = factored(surface_or_mesh, t)
-    array = np.asarray(sources)
+    array = _as_array(sources)
+    best = np.full(heat.mesh.n_nodes, np.inf)
     if array.dtype.kind != "f":
-        return heat.distances(array)
+        for node in _source_nodes(array, heat.mesh.n_nodes):
+            np.minimum(best, heat.distances(node), out=best)
+        return best
     points = as_points(array, "sources")
     corners, shares = _affine(heat.mesh, points)
-    fields = {int(node): heat.distances(node) ** 2 for node in np.unique(corners)}
-    best = np.full(heat.mesh.n_nodes, np.inf)
-    for point, nodes, share in zip(points, corners, shares, strict=True):
-        lift = ((heat.mesh.nodes[nodes] - point) ** 2).sum(axis=1)
-        squared = sum(w * (fields[int(i)] - up) for i, w, up in zip(nodes, share, lift, strict=True))
-        np.minimum(best, squared, out=best)
+    lifts = ((heat.mesh.nodes[corners] - points[:, None]) ** 2).sum(axis=2)
+    for nodes, share, lift in zip(corners, shares, lifts, strict=True):
+        squares = np.stack([heat.distances(node) for node in nodes]) ** 2
+        np.minimum(best, share @ (squares - lift[:, None]), out=best)
     out: Floats = np.sqrt(np.maximum(best, 0.0))
     return out
 
@@ -224,14 +245,12 @@ def factored(
 
 def _time(mesh: TriangleMesh, t: float | None) -> float:
     unit = mesh.mean_edge**2
-    if t is None:
-        return TIME_FACTOR * unit
-    time = as_number(t, "t", positive=True)
+    time = TIME_FACTOR * unit if t is None else as_number(t, "t", positive=True)
     least, greatest = _LEAST_FACTOR * unit, _GREATEST_FACTOR * mesh.area
     if not least <= time <= greatest:
         raise ValueError(
             f"t must be from {least:.3g} to {greatest:.3g} on this mesh, got {time:g}; "
-            f"{TIME_FACTOR:g} times the squared mean edge is {TIME_FACTOR * unit:.3g}"
+            f"{TIME_FACTOR:g} squared mean edges, {TIME_FACTOR * unit:.3g}, suit most"
         )
     return time
 
@@ -265,10 +284,15 @@ def _factor(mesh: TriangleMesh, t: float) -> Any:
     )
 
 
+def _as_array(sources: ArrayLike) -> NDArray[Any]:
+    try:
+        return np.asarray(sources)
+    except ValueError as fault:
+        raise ValueError(f"sources must be one node, a list of nodes or (k, 3) points: {fault}") from None
+
+
 def _source_nodes(sources: ArrayLike, n_nodes: int) -> Ints:
-    array = np.asarray(sources)
-    if array.ndim == 0:
-        array = array.reshape(1)
+    array = np.atleast_1d(_as_array(sources))
     if not array.size:
         raise ValueError("sources is empty: name at least one node")
     nodes = as_indices(array, "sources", (None,), below=n_nodes)

@@ -153,9 +153,9 @@ def _require_disks(mesh: TriangleMesh, labels: Ints, count: int) -> None:
 
 
 def corner_weights(squares: Floats, known: Bools) -> Floats:
-    """Barycentric place (m, 3) in each triangle where the three d² − w are equal, kept inside.
+    """Barycentric place (m, 3) in each triangle where the three d² are equal, kept inside.
 
-    ``squares`` (m, 3, 3): at node i of the triangle, d² − w to the region of node j.
+    ``squares`` (m, 3, 3): at node i of the triangle, d² to the region of node j.
     """
     # differences are linear over the triangle: solve λ·(s0 − s1) = 0, λ·(s0 − s2) = 0, Σ λ = 1
     first = squares[:, :, 0] - squares[:, :, 1]

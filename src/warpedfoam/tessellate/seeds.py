@@ -47,7 +47,7 @@ def blue_noise_seeds(surface: Surface, n: int, rng: object) -> Floats:
 
     Darts drawn uniformly by area are accepted in order, each unless an earlier accepted one lies
     within R (a straight distance); R is bisected to the largest that leaves at least n, and the
-    surplus is dropped at random. The acceptance is done in rounds over all darts at once and gives
+    last few are dropped. The acceptance is done in rounds over all darts at once and gives
     exactly what one dart after another would.
 
     Parameters
@@ -76,7 +76,7 @@ def blue_noise_seeds(surface: Surface, n: int, rng: object) -> Floats:
     True
     """
     count, generator = as_integer(n, "n", minimum=1), as_generator(rng, "rng")
-    darts = surface.random_points(_DARTS * count, generator)
+    darts: Floats = surface.random_points(_DARTS * count, generator)
     spacing = float(np.sqrt(surface.area / count))
     pairs, lengths = _close_pairs(darts, _WIDEST * spacing)
 
@@ -92,8 +92,7 @@ def blue_noise_seeds(surface: Surface, n: int, rng: object) -> Floats:
             low, chosen = middle, kept
         else:
             high = middle
-    kept_darts: Floats = darts[generator.permutation(np.flatnonzero(chosen))[:count]]
-    return kept_darts
+    return np.compress(chosen, darts, axis=0)[:count]
 
 
 def check_seeds(surface: Surface, points: ArrayLike) -> Floats:
