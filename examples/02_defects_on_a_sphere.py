@@ -26,7 +26,7 @@ def main(n_seeds: int = 5, n_bubbles: int = 100) -> float:
         network = relaxed.foam.network
         count = {n: int((network.sides == n).sum()) for n in range(4, 9)}
         charge = int(network.charges.sum())
-        excess = (int(abs(network.charges).sum()) - charge) // 2  # pairs beyond the twelve that topology asks for
+        excess = (int(abs(network.charges).sum()) - charge) // 2  # pairs beyond the twelve fives
         print(
             f"{seed:4d} {relaxed.n_t1:5d}   {count[4]:5d}  {count[5]:5d}  {count[6]:5d}  {count[7]:6d}  "
             f"{count[8]:6d}  {excess:6d}  {charge:6d}  {relaxed.energy:8.3f}"

@@ -291,6 +291,24 @@ def test_output_folder_that_is_a_file(tmp_path: Path) -> None:
     assert path.read_text() == "keep me"
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["sphere", "-n", "3"], "n_bubbles must be at least 4"),
+        (["torus", "-n", "4"], "too few bubbles for the surface"),
+        (["torus", "-n", "2"], "too few bubbles for the surface"),
+    ],
+)
+def test_too_few_bubbles_is_2_and_writes_nothing(
+    arguments: list[str], words: str, tmp_path: Path
+) -> None:
+    result = call("foam", *arguments, "-o", tmp_path)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_unknown_command_line_option_is_2() -> None:
     assert call("foam", "torus", "--radius", "3").exit_code == 2
     assert call("foam", "cube").exit_code == 2

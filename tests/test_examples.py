@@ -28,7 +28,8 @@ def test_every_example_is_tested() -> None:
 
 def test_first_foam_on_a_torus(tmp_path: Path) -> None:
     energy = example("01_first_foam_torus").main(tmp_path)
-    assert energy == pytest.approx(786.5229784, rel=1e-6)
+    # random quenches end 0.4 % round this; a lattice has 771, blue noise 780
+    assert energy == pytest.approx(789.0, rel=0.008)
     assert (tmp_path / "torus.png").stat().st_size > 10_000
 
 

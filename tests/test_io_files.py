@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import stat
 import zipfile
 from dataclasses import dataclass
@@ -86,10 +87,18 @@ class TestAtomic:
             (tmp_path / "file" / "a", ValueError, "not a folder"),
             ("", ValueError, "must name a file"),
             (3, TypeError, "string or a pathlib.Path"),
-            ("/dev/null", ValueError, "not a regular file"),
         ):
             with pytest.raises(fault, match=words), atomic_text(path):  # type: ignore[arg-type]
                 pass
+
+    @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+    def test_refuses_special_files(self, tmp_path: Path) -> None:
+        # a pipe of the test's own: never name a real device here, a fault would replace it
+        pipe = tmp_path / "pipe"
+        os.mkfifo(pipe)
+        with pytest.raises(ValueError, match="not a regular file"), atomic_text(pipe):
+            pass
+        assert pipe.is_fifo()
 
 
 class TestRecord:

@@ -46,7 +46,7 @@ def _seen(foam: Foam, view: View, spots: np.ndarray) -> tuple[np.ndarray, np.nda
         (with_pressures(sphere_foam(80)), (25.0, -60.0)),
         (with_pressures(torus_foam()), (12.0, 20.0)),
         (with_pressures(torus_foam()), (48.0, -60.0)),
-        (with_pressures(torus_foam(6, 40, major_radius=20.0, minor_radius=4.0)), (5.0, 0.0)),
+        (with_pressures(torus_foam(6, 24, major_radius=12.0, minor_radius=4.0)), (5.0, 0.0)),
     ],
     ids=["sphere", "torus-side", "torus-above", "thin-torus"],
 )
@@ -59,13 +59,13 @@ def test_every_pixel_shows_the_bubble_nearest_to_the_viewer(foam: Foam, angles: 
     view = View.from_angles(*angles)
     rng = np.random.default_rng(1)
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
-    spots = np.column_stack([rng.uniform(x0, x1, 500), rng.uniform(y0, y1, 500)])
+    spots = np.column_stack([rng.uniform(x0, x1, 300), rng.uniform(y0, y1, 300)])
     bubble, where, square = _seen(foam, view, spots)
     films = view.project(foam.film_curves(30)).reshape(-1, 3)
     from_film = np.array([np.linalg.norm(films - w, axis=1).min() for w in where])
     # clear spots: bubbles seen squarely and away from their own films; nothing else may show there
     clear = (bubble >= 0) & (square > 0.35) & (from_film > 0.2 * foam.bubble_size)
-    assert clear.sum() > 60
+    assert clear.sum() > 30
     pixel = np.round(axes.transData.transform(spots)).astype(int)
     shown = image[np.clip(len(image) - 1 - pixel[:, 1], 0, len(image) - 1), pixel[:, 0]]
     expected = bubble_colours(foam, "pressure").rgb[bubble].astype(float)
@@ -76,7 +76,7 @@ def test_every_pixel_shows_the_bubble_nearest_to_the_viewer(foam: Foam, angles: 
     solid = view.project(bubble_patches(foam, curve_points=11, rings=5).points)[:, :2]
     beside = np.array([np.linalg.norm(solid - spot, axis=1).min() for spot in spots])
     empty = (bubble < 0) & (beside > 0.1 * foam.bubble_size)
-    assert empty.sum() > 60
+    assert empty.sum() > 30
     assert (shown[empty] == 255.0).all()
 
 
@@ -95,6 +95,13 @@ def test_films_are_drawn_where_they_are() -> None:
     assert (np.array(dark) < 250).mean() > 0.98
 
 
+def test_what_faces_away_is_not_drawn() -> None:
+    foam = sphere_foam(60)
+    drawn = plot_foam(foam).axes[0].collections[0].get_paths()
+    n_triangles = len(bubble_patches(foam, curve_points=11, rings=5).triangles)
+    assert 0.4 < len(drawn) / (n_triangles + 10 * foam.network.n_films) < 0.6
+
+
 def test_legend_counts_all_bubbles() -> None:
     foam = sphere_foam(60)
     texts = [t.get_text() for t in plot_foam(foam).legends[0].get_texts()]
@@ -106,13 +113,18 @@ def test_legend_counts_all_bubbles() -> None:
     assert [t.get_text() for t in plot_foam(bubble_on_torus()).legends[0].get_texts()][-1] == "exterior:  1"
 
 
-def test_nothing_is_cut_off() -> None:
-    for name in ("charge", "area"):
-        figure = plot_foam(sphere_foam(200), name)
-        figure.canvas.draw()
-        image = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
-        rim = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
-        assert (rim == 255).all()
+@pytest.mark.parametrize("name", ["charge", "area"])
+def test_nothing_is_cut_off(name: str) -> None:
+    figure = plot_foam(sphere_foam(60), name)
+    figure.canvas.draw()
+    parts = [*figure.legends, *(axes.get_tightbbox() for axes in figure.axes)]
+    boxes = [part.get_window_extent() if hasattr(part, "get_window_extent") else part for part in parts]
+    width, height = figure.canvas.get_width_height()
+    assert len(boxes) == 2
+    for box in boxes:
+        assert 0 <= box.x0 < box.x1 <= width
+        assert 0 <= box.y0 < box.y1 <= height
+    assert not boxes[0].overlaps(boxes[1])
 
 
 def test_title_and_colour_bar() -> None:

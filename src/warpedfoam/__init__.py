@@ -1,5 +1,21 @@
-"""Bubbles and foams trapped between curved plates."""
+"""Bubbles and foams trapped between curved plates: build, relax, study, export.
 
+A foam one bubble thick sits between two parallel curved plates a small gap apart. The front door:
+
+>>> import warpedfoam as wf
+>>> cell = wf.HeleShawCell(wf.Torus(major_radius=20.0, minor_radius=4.0), gap=0.5)
+>>> foam = wf.voronoi_foam(cell, n_bubbles=150, seeds="lattice")
+>>> relaxed = wf.relax(foam)
+>>> relaxed.converged, int(relaxed.foam.network.charges.sum())
+(True, 0)
+"""
+
+from warpedfoam.analysis import (
+    EquilibriumReport,
+    SideDistribution,
+    equilibrium_report,
+    side_distribution,
+)
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import (
     ConvergenceError,
@@ -10,5 +26,55 @@ from warpedfoam.errors import (
     WarpedFoamError,
 )
 from warpedfoam.foam import Foam
+from warpedfoam.io import (
+    load,
+    save,
+    write_bubbles_csv,
+    write_films_csv,
+    write_ply,
+    write_record,
+)
+from warpedfoam.moves import T1Event, t1
 from warpedfoam.network import CellNetwork, network_from_loops
+from warpedfoam.plot import plot_foam, save_picture
+from warpedfoam.relax import Relaxation, relax
 from warpedfoam.surfaces import Sphere, Surface, Torus, TriangleMesh
+from warpedfoam.tessellate import HeatGeodesics, geodesic_distances, voronoi_foam
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CellNetwork",
+    "ConvergenceError",
+    "EquilibriumReport",
+    "FileFormatError",
+    "Foam",
+    "HeatGeodesics",
+    "HeleShawCell",
+    "MeshError",
+    "Relaxation",
+    "ResolutionError",
+    "SideDistribution",
+    "Sphere",
+    "Surface",
+    "T1Event",
+    "TopologyError",
+    "Torus",
+    "TriangleMesh",
+    "WarpedFoamError",
+    "equilibrium_report",
+    "geodesic_distances",
+    "load",
+    "network_from_loops",
+    "plot_foam",
+    "relax",
+    "save",
+    "save_picture",
+    "side_distribution",
+    "t1",
+    "voronoi_foam",
+    "write_bubbles_csv",
+    "write_films_csv",
+    "write_ply",
+    "write_record",
+]

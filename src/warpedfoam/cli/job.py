@@ -46,8 +46,8 @@ class Job:
 def run_job(options: Options, progress: Progress = silent) -> Job:
     """Build a foam, relax it and write every output.
 
-    Each file is put in place by one rename; ``record.json`` goes first and comes last, so a folder
-    that has one holds the complete outputs of one run.
+    Each file is put in place by one rename. An earlier ``record.json`` is removed before the first and
+    the new one written last, so a folder that has one holds the complete outputs of one run.
 
     Parameters
     ----------
@@ -166,9 +166,11 @@ def _write_outputs(
 
 
 def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
+    from warpedfoam.analysis import equilibrium_report, side_distribution
+
     foam = relaxed.foam
     network = foam.network
-    sides, counts = np.unique(network.sides, return_counts=True)
+    found, report = side_distribution(foam), equilibrium_report(foam)
     honeycomb = HONEYCOMB * float(np.sqrt(foam.bubble_areas).sum())
     return {
         "converged": relaxed.converged,
@@ -184,10 +186,16 @@ def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
         "n_bubbles": network.n_bubbles,
         "n_films": network.n_films,
         "n_vertices": network.n_vertices,
-        "sides": {str(n): count for n, count in zip(sides.tolist(), counts.tolist(), strict=True)},
-        "mu2": float(np.mean((network.sides - 6.0) ** 2)),
-        "sum_of_charges": int(network.charges.sum()),
+        "sides": dict(zip(map(str, found.sides.tolist()), found.counts.tolist(), strict=True)),
+        "mu2": found.mu2,
+        "sum_of_charges": found.total_charge,
         "euler_characteristic": network.euler_characteristic,
+        "equilibrium": {
+            "angle_error": report.angle_error,
+            "curvature_spread": float(report.curvature_spread.max()),
+            "laplace_error": report.laplace_error,
+            "identity_error": report.identity_error,
+        },
         "pressure_range": [float(relaxed.pressures.min()), float(relaxed.pressures.max())],
         "n_t1": relaxed.n_t1,
         "t1": {

@@ -49,12 +49,15 @@ def progress_bars(*, quiet: bool = False) -> Iterator[Progress]:
     )
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         tasks: dict[str, TaskID] = {}
+        furthest: dict[str, float] = {}
 
         def report(stage: str, fraction: float) -> None:
             if stage not in tasks:
                 for earlier in tasks.values():
                     bars.update(earlier, completed=1.0)
                 tasks[stage] = bars.add_task(stage, total=1.0)
-            bars.update(tasks[stage], completed=min(max(fraction, 0.0), 1.0))
+            # a relaxation may lose ground for a while; a bar that runs back helps nobody
+            furthest[stage] = max(furthest.get(stage, 0.0), min(fraction, 1.0))
+            bars.update(tasks[stage], completed=furthest[stage])
 
         yield report

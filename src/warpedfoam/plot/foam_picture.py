@@ -180,7 +180,7 @@ def _paint(
     surface = foam.cell.surface
     corners = view.project(patches.points)[patches.triangles]
     normals = view.project(surface.normals(patches.points))[patches.triangles].mean(axis=1)
-    seen = (facing(corners) > 0.0) & (normals[:, 2] > -0.2)
+    seen = facing(corners) > 0.0
     corners, normals = corners[seen], normals[seen]
     fill = colours.rgb[patches.triangle_bubble[seen]] / 255.0 * shades(normals)[:, None]
 

@@ -86,16 +86,16 @@ def plan_sweep(
 
 
 def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> State:
-    """Lay films that fail but do not turn along the pull on them, where they point against it."""
+    """Lay films that fail but do not turn along the pull on them, if they point against it or are tiny."""
     staying = ~np.isin(sweep.failing, sweep.turning)
     films, pull = sweep.failing[staying], sweep.current[staying]
     network = state.network
     chord = state.points[network.tails[films]] - state.points[network.heads[films]]
-    against = np.einsum("ki,ki->k", chord, pull) < 0.0
-    films, pull, chord = films[against], pull[against], chord[against]
+    span = np.linalg.norm(chord, axis=1)
+    lost = (np.einsum("ki,ki->k", chord, pull) < 0.0) | (span < 0.5 * SHORT * length)
+    films, pull, span = films[lost], pull[lost], np.maximum(span[lost], 0.5 * SHORT * length)
     if not films.size:
         return state
-    span = np.maximum(np.linalg.norm(chord, axis=1), 0.5 * SHORT * length)
     sites = t1_sites(network, films)
     points, _ = lay_films(cell.surface, network, state.points, state.offsets, sites, pull, span)
     offsets = state.offsets.copy()
