@@ -434,7 +434,7 @@ def test_interrupted_while_relaxing_writes_nothing(tmp_path: Path) -> None:
             print("RELAXING", flush=True)
             time.sleep(60.0)
 
-        warpedfoam.relax.relax = stuck
+        sys.modules["warpedfoam.relax"].relax = stuck
         sys.argv = ["warpedfoam", "foam", "sphere", "--seeds", "lattice", "-n", "16", "-o", sys.argv[1]]
         sys.exit(main())
     """

@@ -215,15 +215,17 @@ class Foam:
         """Mean point of each bubble's boundary, projected on the surface, (n_bubbles, 3)."""
         nodes, weights = gauss(3)
         points = np.einsum("q,fqx->fx", weights, self.film_curves_at(nodes))
-        lengths, halves = self.film_lengths, self.network.loops.halves
+        tail, head = self.film_ends
+        halves, count = self.network.loops.halves, self.n_bubbles
         film, owner = halves >> 1, self.network.bubble[halves]
-        weight = lengths[film]
-        total = np.bincount(owner, weight, minlength=self.n_bubbles)
-        mean = np.stack(
-            [np.bincount(owner, weight * points[film, k], minlength=self.n_bubbles) for k in range(3)],
-            axis=1,
-        )
-        return frozen(self.cell.surface.project(mean / total[:, None]))
+        sign = np.where(halves & 1, -1.0, 1.0)[:, None]
+        weight = self.film_lengths[film][:, None]
+        parts = np.hstack([weight * points[film], sign * np.cross(points, head - tail)[film], weight])
+        sums = np.stack([np.bincount(owner, part, minlength=count) for part in parts.T], axis=1)
+        # a hair along the loop's vector area, so that a hemisphere has a centre too
+        normal = sums[:, 3:6] / np.maximum(np.linalg.norm(sums[:, 3:6], axis=1, keepdims=True), 1e-300)
+        mean = sums[:, :3] / sums[:, 6:] + 1e-3 * self.bubble_size * normal
+        return frozen(self.cell.surface.project(mean))
 
     def film_curves(self, k: int = 16) -> Floats:
         """``k`` points along each film, ends included, for drawing: (n_films, k, 3).

@@ -120,7 +120,7 @@ def relax(
         start,
         with_t1,
         np.zeros(start.network.n_films, dtype=np.int64),
-        pinned_unknowns(foam.cell, start.vertex_points),
+        pinned_unknowns(foam.cell, state),
     )
     residuals, converged = _iterate(run, tol, limit, progress)
     clock.lap("total")

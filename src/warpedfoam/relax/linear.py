@@ -32,9 +32,9 @@ class Factor(Protocol):
 
 
 class Factoriser(Protocol):
-    """Factors matrices that share one sparsity pattern."""
+    """Factors matrices; may reuse what it knows of a ``pattern`` object seen before."""
 
-    def factor(self, matrix: csc_array) -> Factor:
+    def factor(self, matrix: csc_array, pattern: object) -> Factor:
         """Factor ``matrix`` (both triangles stored)."""
         ...
 
@@ -68,7 +68,7 @@ class SuperLUFactor:
 class SuperLU:
     """The default: SciPy's SuperLU."""
 
-    def factor(self, matrix: csc_array) -> Factor:
+    def factor(self, matrix: csc_array, pattern: object) -> Factor:
         """Factor ``matrix``."""
         return SuperLUFactor(matrix)
 

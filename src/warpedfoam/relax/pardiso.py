@@ -31,38 +31,37 @@ class Pardiso:
     """Keeps the symbolic factorisation while the pattern stays the same."""
 
     def __init__(self) -> None:
-        self._solver: PyPardisoSolver | None = None
-        self._indices: object = None
+        # made once: finding the library costs more than factoring a thousand bubbles
+        self._solver = PyPardisoSolver(mtype=_SYMMETRIC)
+        self._pattern: object = None
+        # own settings; the order is given; no scaling or matching; Bunch–Kaufman pivots, weak ones
+        # perturbed at 1e-13 and mended by two steps of refinement
+        for place, value in ((1, 1), (5, 1), (8, 2), (10, 13), (11, 0), (13, 0), (21, 1)):
+            self._solver.set_iparm(place, value)
 
-    def factor(self, matrix: csc_array) -> PardisoFactor:
-        """Factor ``matrix`` (both triangles stored); frees the one before."""
+    def factor(self, matrix: csc_array, pattern: object) -> PardisoFactor:
+        """Factor ``matrix`` (both triangles stored); the factorisation before is overwritten."""
         # the lower triangle by columns is the upper one by rows, which is what Pardiso takes
         lower = tril(matrix, format="csc")
         upper = csr_matrix((lower.data, lower.indices, lower.indptr), shape=lower.shape)
         upper.sort_indices()
         solver = self._solver
-        if solver is None or self._indices is not matrix.indices:
-            self.close()
-            solver = self._solver = PyPardisoSolver(mtype=_SYMMETRIC)
-            solver.set_iparm(1, 1)
-            solver.set_iparm(2, 2)  # nested dissection
-            solver.set_iparm(10, 13)  # perturb pivots below 1e-13
-            solver.set_iparm(11, 0)
-            solver.set_iparm(13, 0)
-            solver.set_iparm(8, 2)
-            solver.set_iparm(21, 1)  # Bunch–Kaufman pivots
-            self._indices = matrix.indices
-            solver.set_phase(12)
-        else:
+        if self._pattern is pattern:
             solver.set_phase(22)
+        else:
+            self._release()
+            # the matrix comes in a fill-reducing order: keep it
+            solver.perm = np.arange(1, upper.shape[0] + 1, dtype=np.int32)
+            solver.set_phase(12)
+            self._pattern = pattern
         solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
         return PardisoFactor(solver, upper)
 
-    def close(self) -> None:
-        """Free the solver's memory."""
-        if self._solver is not None:
+    def _release(self) -> None:
+        if self._pattern is not None:
+            perm, self._solver.perm = self._solver.perm, np.zeros(0, dtype=np.int32)
             self._solver.free_memory(everything=True)
-            self._solver = None
+            self._solver.perm, self._pattern = perm, None
 
     def __del__(self) -> None:
-        self.close()
+        self._release()

@@ -16,6 +16,7 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.energy import bubble_volumes, film_terms
 from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
 from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.moves.t1 import outward_tangents
 from warpedfoam.network import CellNetwork
 from warpedfoam.relax.linear import Factor, Factoriser
 from warpedfoam.relax.pattern import Pattern
@@ -127,6 +128,8 @@ class Linearised:
         self.hessian[:, :4] *= system.length
         self.volume[:4] *= system.length
         self.force[:4] *= system.length
+        if len(network.markers):
+            self._hold_markers()
         volumes = bubble_volumes(system.cell, network, state.points, state.offsets)
         self.volume_fault = (volumes - system.targets) / system.mean_volume
         relative = np.abs(volumes - system.targets) / system.targets
@@ -137,6 +140,25 @@ class Linearised:
     def energy(self) -> float:
         """Σ film areas / (d ℓ)."""
         return float(self.area.sum()) / self.system.film_unit
+
+    def _hold_markers(self) -> None:
+        """Let markers move across their film only: sliding along it would exploit the quadrature."""
+        network = self.state.network
+        along = marker_tangents(self.system.cell, self.state)
+        where = np.full(network.n_vertices, -1)
+        where[network.markers] = np.arange(len(along))
+        for row, ends in ((0, network.tails), (2, network.heads)):
+            film = np.flatnonzero(where[ends] >= 0)
+            t = along[where[ends[film]]].T
+            project = np.eye(2)[..., None] - t[:, None] * t[None]
+            rows = slice(row, row + 2)
+            for array in (self.force, self.volume):
+                array[rows, film] = np.einsum("ijf,jf->if", project, array[rows, film])
+            hessian = self.hessian[:, :, film]
+            hessian[rows] = np.einsum("ijf,jkf->ikf", project, hessian[rows])
+            hessian[:, rows] = np.einsum("kjf,jif->kif", hessian[:, rows], project)
+            hessian[rows, rows] += 0.5 * t[:, None] * t[None]
+            self.hessian[:, :, film] = hessian
 
     def _residuals(self, volume_error: float) -> Residuals:
         network = self.state.network
@@ -208,7 +230,7 @@ class Linearised:
         rhs[2 * network.n_vertices :] += volume_fault
         ordered = pattern.ordered(rhs)
         clock.lap("assemble")
-        factor = system.factoriser.factor(matrix)
+        factor = system.factoriser.factor(matrix, pattern)
         x = factor.solve(ordered)
         x += factor.solve(ordered - matrix @ x)
         clock.lap("solve")
@@ -231,14 +253,34 @@ def one_ring(network: CellNetwork, values: Floats) -> Floats:
     return out
 
 
-def pinned_unknowns(cell: HeleShawCell, points: Floats) -> Ints:
+def marker_tangents(cell: HeleShawCell, state: State) -> Floats:
+    """Direction of the film at each marker, in the vertex frame: (n_markers, 2) unit vectors."""
+    network = state.network
+    markers = network.markers
+    order = np.argsort(network.origin, kind="stable")
+    first = order[np.searchsorted(network.origin[order], markers)]
+    halves = np.stack([first, network.next[first ^ 1]], axis=1)
+    tangents = outward_tangents(cell.surface, network, state.points, state.offsets, halves)
+    frames = cell.surface.vertex_frames(state.points[markers])
+    along = np.einsum("mij,mj->mi", frames, tangents[:, 0] - tangents[:, 1])
+    out: Floats = along / np.linalg.norm(along, axis=1, keepdims=True)
+    return out
+
+
+def pinned_unknowns(cell: HeleShawCell, state: State) -> Ints:
     """Vertex unknowns (indices into (n_vertices, 2), flattened) that fix the rigid motions."""
     from scipy.linalg import qr
 
-    modes = cell.surface.rigid_motions(points)
+    modes = cell.surface.rigid_motions(state.points)
     if not len(modes):
         return np.zeros(0, dtype=np.int64)
-    frames = cell.surface.vertex_frames(points)
-    matrix = np.einsum("kvx,vix->kvi", modes, frames).reshape(len(modes), -1)
-    _, _, pivots = qr(matrix, mode="economic", pivoting=True)
-    return np.asarray(pivots[: len(modes)], dtype=np.int64)
+    frames = cell.surface.vertex_frames(state.points)
+    matrix = np.einsum("kvx,vix->kvi", modes, frames)
+    markers = state.network.markers
+    if len(markers):
+        along = marker_tangents(cell, state)
+        matrix[:, markers] -= np.einsum("kmi,mi,mj->kmj", matrix[:, markers], along, along)
+    _, triangle, pivots = qr(matrix.reshape(len(modes), -1), mode="economic", pivoting=True)
+    size = np.abs(np.diagonal(triangle))
+    rank = int((size > 1e-6 * size.max(initial=1e-300)).sum())
+    return np.asarray(pivots[:rank], dtype=np.int64)
