@@ -48,7 +48,7 @@ def as_number(
         if value.ndim or value.dtype.kind not in "fiu":
             raise TypeError(f"{name} must be a single number, got an array of shape {value.shape}")
         value = value.item()
-    number = float(value)
+    number = float(value)  # type: ignore[arg-type]
     if not np.isfinite(number):
         raise ValueError(f"{name} must be finite, got {number}")
     if positive and number <= 0.0:
@@ -58,9 +58,7 @@ def as_number(
     return number
 
 
-def as_integer(
-    value: object, name: str, *, minimum: int | None = None, maximum: int | None = None
-) -> int:
+def as_integer(value: object, name: str, *, minimum: int | None = None, maximum: int | None = None) -> int:
     """Return an int; floats are refused even when they are whole, so that 200.5 is not read as 200.
 
     Raises
@@ -154,9 +152,7 @@ def as_indices(
     _check_shape(array, name, shape)
     if array.size and (array.min() < 0 or (below is not None and array.max() >= below)):
         top = "" if below is None else f" and below {below}"
-        raise ValueError(
-            f"{name} must be at least 0{top}, found {int(array.min())} … {int(array.max())}"
-        )
+        raise ValueError(f"{name} must be at least 0{top}, found {int(array.min())} … {int(array.max())}")
     return array
 
 
@@ -187,7 +183,8 @@ def _check_shape(array: NDArray[Any], name: str, shape: tuple[int | None, ...]) 
         want is None or want == have for want, have in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+        sizes = ", ".join("n" if s is None else str(s) for s in shape)
+        wanted = f"({sizes},)" if len(shape) == 1 else f"({sizes})"
         raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
 
 

@@ -102,8 +102,8 @@ class Foam:
         away = np.linalg.norm(cell.surface.project(points) - points, axis=1)
         if away.max() > 1e-9 * size:
             raise ValueError(
-                f"vertex_points must lie on the surface, but vertex {int(away.argmax())} is {away.max():g} "
-                "away; project them first (cell.surface.project)"
+                f"vertex_points must lie on the surface, but vertex {int(away.argmax())} is "
+                f"{away.max():g} away; project them first (cell.surface.project)"
             )
         put(self, "vertex_points", frozen(points))
         if film_offsets is None:
@@ -119,7 +119,8 @@ class Foam:
             raise ValueError(f"target_volumes must be above 0, but bubble {bad} has {targets[bad]:g}")
         if abs(targets.sum() - cell.volume) > 1e-9 * cell.volume:
             raise ValueError(
-                f"target_volumes must add up to the cell's volume {cell.volume:.12g}, got {targets.sum():.12g}; "
+                f"target_volumes must add up to the cell's volume {cell.volume:.12g}, "
+                f"got {targets.sum():.12g}; "
                 "scale them by the ratio"
             )
         put(self, "target_volumes", frozen(targets))
@@ -163,7 +164,7 @@ class Foam:
     @property
     def order(self) -> int:
         """p, the polynomial order of the films."""
-        return self.film_offsets.shape[1] + 1
+        return int(self.film_offsets.shape[1]) + 1
 
     @property
     def n_bubbles(self) -> int:

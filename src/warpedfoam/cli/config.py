@@ -189,9 +189,7 @@ def read_options(path: str | Path, overrides: Iterable[str] = ()) -> Options:
     return options_from(values, str(path), origins)
 
 
-def options_from(
-    values: Mapping[str, Any], source: str, origins: Mapping[str, str] | None = None
-) -> Options:
+def options_from(values: Mapping[str, Any], source: str, origins: Mapping[str, str] | None = None) -> Options:
     """Check nested plain values and return them as `Options`.
 
     Parameters
@@ -296,9 +294,7 @@ def _surface(table: Mapping[str, Any], places: _Places) -> SurfaceOptions:
     return SurfaceOptions(kind, sizes)
 
 
-def _section(
-    kind: type[Section], section: str, table: Mapping[str, Any], places: _Places
-) -> Section:
+def _section(kind: type[Section], section: str, table: Mapping[str, Any], places: _Places) -> Section:
     read = {f.name: f.metadata["read"] for f in fields(kind)}  # type: ignore[arg-type]
     return kind(
         **{name: places.read(f"{section}.{name}", value, read[name]) for name, value in table.items()}

@@ -52,12 +52,10 @@ def film_terms(
     )
 
 
-def bubble_volumes(
-    cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats
-) -> Floats:
+def bubble_volumes(cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats) -> Floats:
     """Steiner volumes of all bubbles, (n_bubbles,): the function whose derivative `film_terms` gives."""
     loops = network.loops
     tail, head = points[network.tails], points[network.heads]
     parts = cell.surface.loop_integrals(tail, head, offsets, loops, cell.layer)
     owner = network.bubble[loops.halves[loops.starts]]
-    return np.bincount(owner, parts, minlength=network.n_bubbles)
+    return np.bincount(owner, parts, network.n_bubbles).astype(np.float64, copy=False)

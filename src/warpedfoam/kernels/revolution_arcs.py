@@ -64,9 +64,7 @@ def film_density(arcs: TubeArcs, ring: float, radii: Floats, shares: Floats) -> 
     return total
 
 
-def film_density_first(
-    arcs: TubeArcs, ring: float, radii: Floats, shares: Floats
-) -> tuple[Floats, Floats]:
+def film_density_first(arcs: TubeArcs, ring: float, radii: Floats, shares: Floats) -> tuple[Floats, Floats]:
     """The film density (K, F) and its derivatives by (φ, φ', θ'), (3, K, F)."""
     cos, sin = np.cos(arcs.phi), np.sin(arcs.phi)
     x, y = arcs.dphi, arcs.dtheta
@@ -146,9 +144,7 @@ def pulled_gradient(arcs: TubeArcs, first: Floats, jacobian: Floats) -> Floats:
     return nodal_gradient(arcs.rule, by_y[:3], by_y[3], by_y[4])
 
 
-def pulled_hessian(
-    arcs: TubeArcs, first: Floats, second: Floats, jacobian: Floats, bends: Floats
-) -> Floats:
+def pulled_hessian(arcs: TubeArcs, first: Floats, second: Floats, jacobian: Floats, bends: Floats) -> Floats:
     """Hessian (p + 2, p + 2, F) by (φ_A, φ_B, Δθ, u), from e's derivatives (3, …) and (6, …)."""
     full = np.einsum("akf,ayzkf->yzkf", first, bends)
     for (i, j), term in zip(PAIRS, second, strict=True):

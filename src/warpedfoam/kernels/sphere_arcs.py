@@ -23,9 +23,7 @@ def arc_length_and_lune(rule: LobattoRule, length: Floats, offsets: Floats) -> t
     return length * (rule.weights @ speed), length * (rule.weights @ np.sin(beta))
 
 
-def arc_gradients(
-    rule: LobattoRule, length: Floats, offsets: Floats
-) -> tuple[Floats, Floats, Floats]:
+def arc_gradients(rule: LobattoRule, length: Floats, offsets: Floats) -> tuple[Floats, Floats, Floats]:
     """Arc length (F,) and the gradients (p, F) of arc length and lune area by (L, u)."""
     v, w = shape_values(rule, offsets)
     beta = length * v
@@ -100,7 +98,7 @@ def vertex_hessian(
     tau = np.concatenate([-ta, tb])
     cot, csc = 1.0 / np.tan(length), 1.0 / np.sin(length)
     half = np.tan(0.5 * length)
-    out = (curvature * tau)[:, None, :] * tau[None, :, :]
+    out: Floats = (curvature * tau)[:, None, :] * tau[None, :, :]
     out[:2, :2] += (slope * cot * na)[:, None] * na[None]
     out[2:, 2:] += (slope * cot * nb)[:, None] * nb[None]
     mixed = (-slope * csc * na)[:, None] * nb[None]

@@ -81,7 +81,8 @@ def allowed(network: CellNetwork, sites: T1Sites) -> Bools:
     distinct = (np.diff(ordered, axis=1) > 0).all(axis=1)
     threefold = (network.vertex_degrees[network.origin[np.stack([sites.a, sites.c])]] == 3).all(axis=0)
     disks = (network.bubble_euler[sites.bubbles] == 1).all(axis=1)
-    return sides & distinct & threefold & disks
+    out: Bools = sides & distinct & threefold & disks
+    return out
 
 
 def rewire(network: CellNetwork, films: ArrayLike) -> CellNetwork:
@@ -148,13 +149,14 @@ def outward_tangents(
     curve = surface.arc_points(
         points[network.tails[flat]], points[network.heads[flat]], offsets[flat], rule.nodes
     )
-    ends = np.where(
+    ends: Floats = np.where(
         back.ravel()[:, None],
         -np.einsum("k,fkx->fx", rule.derivative[-1], curve),
         np.einsum("k,fkx->fx", rule.derivative[0], curve),
     )
     ends /= np.linalg.norm(ends, axis=1, keepdims=True)
-    return ends.reshape(*halves.shape, 3)
+    out: Floats = ends.reshape(*halves.shape, 3)
+    return out
 
 
 def pulls(tangents: Floats) -> tuple[Floats, Floats]:
@@ -205,7 +207,13 @@ def t1(foam: Foam, film: int, *, length: float | None = None) -> Foam:
     tangents = outward_tangents(surface, foam.network, foam.vertex_points, foam.film_offsets, sites.outer)
     span = 0.1 * foam.bubble_size if length is None else length
     points, offsets = lay_films(
-        surface, foam.network, foam.vertex_points, foam.film_offsets, sites, pulls(tangents)[1], np.array([span])
+        surface,
+        foam.network,
+        foam.vertex_points,
+        foam.film_offsets,
+        sites,
+        pulls(tangents)[1],
+        np.array([span]),
     )
     return replace(foam, network=network, vertex_points=points, film_offsets=offsets, pressures=None)
 
@@ -219,7 +227,7 @@ def lay_films(
     along: Floats,
     length: Floats,
 ) -> tuple[Floats, Floats]:
-    """Points and offsets with each site's film laid along ``along`` (k, 3), tail forward, about its middle."""
+    """Points and offsets with each site's film laid along ``along`` (k, 3), about its middle."""
     tail, head = network.origin[sites.a], network.origin[sites.c]
     middle = 0.5 * (points[tail] + points[head])
     normal = surface.normals(middle)

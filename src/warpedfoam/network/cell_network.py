@@ -54,7 +54,7 @@ class CellNetwork:
 
     def __init__(
         self,
-        next: ArrayLike,  # noqa: A002 - the field's word
+        next: ArrayLike,
         origin: ArrayLike,
         bubble: ArrayLike,
         bubble_euler: ArrayLike | None = None,

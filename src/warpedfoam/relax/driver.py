@@ -30,7 +30,7 @@ from warpedfoam.relax.system import (
 SOFTNESS, VOLUME_STEP = 0.02, 0.15
 #: Largest changes in one proximal step: of a vertex (in ℓ), of an offset.
 VERTEX_CAP, OFFSET_CAP = 0.3, 0.2
-#: Exact Newton starts below the first residual, is left above the second, and steps no farther than the third.
+#: Exact Newton starts below the first residual, is left above the second, steps no farther than the third.
 EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
 
 
@@ -96,10 +96,10 @@ def relax(
     Examples
     --------
     >>> from warpedfoam import HeleShawCell, Sphere, voronoi_foam
-    >>> foam = voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), n_bubbles=12, seeds="lattice")
-    >>> result = relax(foam, order=8)
-    >>> result.converged, round(float(result.foam.film_lengths.sum()), 6)
-    (True, 21.89183)
+    >>> foam = voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), n_bubbles=40, seed=1)
+    >>> result = relax(foam)
+    >>> result.converged, result.residual < 1e-10, result.volume_error < 1e-12
+    (True, True, True)
     """
     if not isinstance(foam, Foam):
         raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
@@ -155,10 +155,9 @@ def _iterate(
     while True:
         lin = run.system.linearise(run.state)
         now = lin.residuals
-        worst = max(now.force, 100.0 * now.volume_error)
         if progress is not None:
-            span = np.log10(max(worst, tolerance)) / np.log10(tolerance)
-            progress("relax", float(np.clip(span, 0.0, 1.0)))
+            # the mean digit count of the vertices' residuals grows almost evenly with time
+            progress("relax", float(-np.log10(np.clip(now.vertex, 1e-5, 1.0)).mean()) / 5.0)
         done = now.force <= tolerance and now.volume_error <= max(0.01 * tolerance, 1e-12)
         if done or run.iteration >= limit or not np.isfinite(now.force):
             if np.isfinite(now.force):
@@ -229,9 +228,7 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
     _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
 
 
-def _kkt_step(
-    run: _Run, lin: Linearised, condensed: Condensed, shift: float
-) -> tuple[Step, bool]:
+def _kkt_step(run: _Run, lin: Linearised, condensed: Condensed, shift: float) -> tuple[Step, bool]:
     """Newton step with shift σ on the vertices, rigid motions pinned; and whether its inertia is right."""
     network = run.state.network
     vertex = np.full(2 * network.n_vertices, shift)
@@ -259,9 +256,7 @@ def _moved(run: _Run, step: Step) -> State:
     )
 
 
-def _message(
-    converged: bool, residuals: Residuals, run: _Run, tolerance: float, limit: int
-) -> str:
+def _message(converged: bool, residuals: Residuals, run: _Run, tolerance: float, limit: int) -> str:
     if converged:
         return f"converged in {run.iteration} steps with {len(run.events)} T1s"
     if not np.isfinite(residuals.force):

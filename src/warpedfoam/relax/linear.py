@@ -69,7 +69,8 @@ class SuperLU:
     """The default: SciPy's SuperLU."""
 
     def factor(self, matrix: csc_array, pattern: object) -> Factor:
-        """Factor ``matrix``."""
+        """Factor ``matrix``; SuperLU keeps nothing of the pattern."""
+        del pattern
         return SuperLUFactor(matrix)
 
 

@@ -50,13 +50,15 @@ class Pattern:
 
     def matrix(self, blocks: Floats, shifts: Floats) -> csc_array:
         """The ordered matrix from film blocks (6, 6, F) plus ``shifts`` (size,) on its diagonal."""
-        data = np.bincount(self._slots, blocks.ravel(), minlength=len(self._indices))
+        data: Floats = np.bincount(self._slots, blocks.ravel(), len(self._indices)).astype(
+            np.float64, copy=False
+        )
         data[self.diagonal] += shifts
         return csc_array((data, self._indices, self._indptr), shape=(self.size, self.size))
 
     def gather(self, parts: Floats) -> Floats:
         """Sum film vectors (6, F) into one vector (size,), in the order of the unknowns."""
-        return np.bincount(self.dofs.ravel(), parts.ravel(), minlength=self.size)
+        return np.bincount(self.dofs.ravel(), parts.ravel(), self.size).astype(np.float64, copy=False)
 
     def ordered(self, vector: Floats) -> Floats:
         """A vector in matrix order."""

@@ -31,9 +31,13 @@ PREFERENCE = (1e-3, 0.02)
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Films about to vanish, those among them that turn, and the limit on each vertex's step."""
+    """Films about to vanish, those among them that turn, and the limit on each vertex's step.
+
+    ``collapsing`` tells which of ``failing`` would lose more than half of their chord.
+    """
 
     failing: Ints
+    collapsing: Bools
     turning: Ints
     along: Floats
     current: Floats
@@ -60,8 +64,6 @@ def plan_sweep(
     shrink = np.where(reversed_, was + now, was - now)
     share = np.where(shrink > 0.5 * was, 0.5 * was / np.maximum(shrink, 1e-300), 1.0)
     failing = np.flatnonzero(fails)
-    if not t1:
-        failing = failing[:0]
     empty = np.zeros((0, 3))
     sites = t1_sites(network, failing)
     fine = allowed(network, sites)
@@ -73,21 +75,22 @@ def plan_sweep(
         tangents = outward_tangents(cell.surface, network, state.points, state.offsets, sites.outer)
         current, turned = pulls(tangents)
         gain = np.linalg.norm(turned, axis=1) - np.linalg.norm(current, axis=1)
-        wins = fine & (gain > PREFERENCE[0] + PREFERENCE[1] * turns[failing])
+        wins = t1 & fine & (gain > PREFERENCE[0] + PREFERENCE[1] * turns[failing])
         if wins.any():
             chosen = np.flatnonzero(wins)
             apart = independent(_only(sites, wins), gain[chosen])
             turning, along = failing[chosen[apart]], turned[chosen[apart]]
+    collapsing = share[failing] < 1.0
     share[turning] = 1.0
     limit = np.ones(network.n_vertices)
     np.minimum.at(limit, network.tails, share)
     np.minimum.at(limit, network.heads, share)
-    return Sweep(failing, turning, along, current, limit)
+    return Sweep(failing, collapsing, turning, along, current, limit)
 
 
 def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> State:
-    """Lay films that fail but do not turn along the pull on them, if they point against it or are tiny."""
-    staying = ~np.isin(sweep.failing, sweep.turning)
+    """Lay films that fail but do not turn along the pull on them, if they point against it or collapse."""
+    staying = ~np.isin(sweep.failing, sweep.turning) & sweep.collapsing
     films, pull = sweep.failing[staying], sweep.current[staying]
     network = state.network
     chord = state.points[network.tails[films]] - state.points[network.heads[films]]
@@ -123,12 +126,15 @@ def turned(
     points, offsets = lay_films(cell.surface, network, state.points, state.offsets, sites, sweep.along, span)
     after_state = State(rewire(network, films), points, offsets, state.pressures)
     after = _energies(cell, after_state, five)
-    middle = cell.surface.project(
-        0.5 * (points[network.origin[sites.a]] + points[network.origin[sites.c]])
-    )
+    middle = cell.surface.project(0.5 * (points[network.origin[sites.a]] + points[network.origin[sites.c]]))
     ids = bubble_ids[sites.bubbles].tolist()
     columns = zip(
-        films.tolist(), ids, middle.tolist(), (tension * before).tolist(), (tension * after).tolist(), strict=True
+        films.tolist(),
+        ids,
+        middle.tolist(),
+        (tension * before).tolist(),
+        (tension * after).tolist(),
+        strict=True,
     )
     events = [
         T1Event(iteration, film, (four[0], four[1]), (four[2], four[3]), (at[0], at[1], at[2]), e0, e1)
@@ -147,5 +153,11 @@ def _energies(cell: HeleShawCell, state: State, films: Ints) -> Floats:
 
 def _only(sites: T1Sites, keep: Bools) -> T1Sites:
     return T1Sites(
-        sites.a[keep], sites.c[keep], sites.a0[keep], sites.a1[keep], sites.b0[keep], sites.b1[keep], sites.bubbles[keep]
+        sites.a[keep],
+        sites.c[keep],
+        sites.a0[keep],
+        sites.a1[keep],
+        sites.b0[keep],
+        sites.b1[keep],
+        sites.bubbles[keep],
     )

@@ -21,7 +21,6 @@ from warpedfoam.network import CellNetwork
 from warpedfoam.relax.linear import Factor, Factoriser
 from warpedfoam.relax.pattern import Pattern
 
-
 #: Least stiffness of an offset in a proximal step, relative to a straight film of the same length.
 STIFFNESS_FLOOR = 0.5
 
@@ -163,7 +162,9 @@ class Linearised:
     def _residuals(self, volume_error: float) -> Residuals:
         network = self.state.network
         count = network.n_vertices
-        ends = np.concatenate([2 * network.tails, 2 * network.tails + 1, 2 * network.heads, 2 * network.heads + 1])
+        ends = np.concatenate(
+            [2 * network.tails, 2 * network.tails + 1, 2 * network.heads, 2 * network.heads + 1]
+        )
         net = np.bincount(ends, self.force[:4].ravel(), minlength=2 * count).reshape(count, 2)
         at_vertex = np.linalg.norm(net, axis=1)
         if len(self.force) > 4:

@@ -140,14 +140,10 @@ def _check_closed(mesh: TriangleMesh) -> None:
     tri, n = mesh.triangles, mesh.n_nodes
     unused = np.setdiff1d(np.arange(n), tri)
     if unused.size:
-        raise MeshError(
-            f"{unused.size} nodes belong to no triangle (first: node {unused[0]}); remove them"
-        )
+        raise MeshError(f"{unused.size} nodes belong to no triangle (first: node {unused[0]}); remove them")
     same = (tri == np.roll(tri, 1, axis=1)).any(axis=1)
     if same.any():
-        raise MeshError(
-            f"triangle {int(np.flatnonzero(same)[0])} uses a node twice; remove such triangles"
-        )
+        raise MeshError(f"triangle {int(np.flatnonzero(same)[0])} uses a node twice; remove such triangles")
     longest = np.linalg.norm(mesh.nodes[tri] - mesh.nodes[np.roll(tri, 1, axis=1)], axis=2).max(axis=1)
     flat = mesh.triangle_areas <= 1e-10 * longest**2
     if flat.any():

@@ -50,8 +50,8 @@ def _strip(lower: Floats, upper: Floats, lower_first: int, upper_first: int) -> 
     below = np.arange(n + m) < n
     order = np.lexsort((below, middles))
     below = below[order]
-    steps_low, steps_up = np.cumsum(below) - below, np.cumsum(~below) - (~below)
-    low, up = steps_low % n, steps_up % m
+    low = np.remainder(np.cumsum(below) - below, n)
+    up = np.remainder(np.cumsum(~below) - ~below, m)
     a, b = lower_first + low, upper_first + up
     third = np.where(below, lower_first + (low + 1) % n, upper_first + (up + 1) % m)
     return np.stack([a, third, b], axis=1)

@@ -59,7 +59,8 @@ class Torus:
         tube = as_number(self.minor_radius, "minor_radius", positive=True)
         if ring <= tube:
             raise ValueError(
-                f"major_radius must exceed minor_radius (else the torus cuts itself), got {ring:g} <= {tube:g}"
+                "major_radius must exceed minor_radius (else the torus cuts itself), "
+                f"got {ring:g} <= {tube:g}"
             )
         object.__setattr__(self, "major_radius", ring)
         object.__setattr__(self, "minor_radius", tube)
@@ -114,9 +115,7 @@ class Torus:
     def points(self, phi: Floats, theta: Floats) -> Floats:
         """The point at tube angle φ and ring angle θ; arrays of one shape give (…, 3)."""
         out = self.major_radius + self.minor_radius * np.cos(phi)
-        return np.stack(
-            [out * np.cos(theta), out * np.sin(theta), self.minor_radius * np.sin(phi)], axis=-1
-        )
+        return np.stack([out * np.cos(theta), out * np.sin(theta), self.minor_radius * np.sin(phi)], axis=-1)
 
     def project(self, points: ArrayLike) -> Floats:
         """The point of the same angles; see `angles` for what it refuses."""
@@ -207,17 +206,13 @@ class Torus:
     def _nodes(self, tail: Floats, head: Floats, offsets: Floats) -> arcs.TubeArcs:
         phi_a, phi_b, dtheta, _ = self._chart(tail, head)
         rule = lobatto(offsets.shape[1] + 1)
-        return arcs.tube_arcs(
-            rule, self.major_radius, self.minor_radius, phi_a, phi_b, dtheta, offsets.T
-        )
+        return arcs.tube_arcs(rule, self.major_radius, self.minor_radius, phi_a, phi_b, dtheta, offsets.T)
 
     def arc_measure(self, tail: Floats, head: Floats, offsets: Floats, layer: Layer) -> Floats:
         """Σ_t shares_t ∫ sqrt((r + t)² φ'² + (R + (r + t) cos φ)² θ'²) dξ."""
         nodes = self._nodes(tail, head, offsets)
         radii = self.minor_radius + layer.heights
-        out: Floats = nodes.rule.weights @ arcs.film_density(
-            nodes, self.major_radius, radii, layer.shares
-        )
+        out: Floats = nodes.rule.weights @ arcs.film_density(nodes, self.major_radius, radii, layer.shares)
         return out
 
     def arc_terms(
@@ -308,7 +303,8 @@ class Torus:
         sizes = loops.sizes
         turns = total - np.repeat(total[loops.starts], sizes)
         terms = sign * (along[film] + TURN * alpha * turns * dtheta[film])
-        return -np.add.reduceat(terms, loops.starts)
+        out: Floats = -np.add.reduceat(terms, loops.starts)
+        return out
 
 
 def _end_scales(ring: float, tube: float, phi_a: Floats, phi_b: Floats) -> Floats:
@@ -328,7 +324,7 @@ def _to_frames(chart: Floats, scale: Floats) -> Floats:
 def _hessian_to_frames(chart: Floats, scale: Floats) -> Floats:
     n = len(chart) + 1
     take = np.concatenate([[0, 2, 1, 2], np.arange(3, n - 1)])
-    out = chart[take][:, take]
+    out: Floats = chart[take][:, take]
     out[1] = -out[1]
     out[:, 1] = -out[:, 1]
     out[:4] *= scale[:, None]

@@ -159,7 +159,7 @@ def _laid_out(
     at = np.broadcast_to(corner[:, :, None], (len(corner), 3, 3))
     to = np.broadcast_to(labels[corner][:, None, :], (len(corner), 3, 3))
     squares, known = field.square_to(at, to)
-    place = corner_weights(squares, known.all(axis=(1, 2)))
+    place = corner_weights(squares, np.all(known, axis=(1, 2)))
     vertices = surface.project(np.einsum("mi,mix->mx", place, mesh.nodes[corner]))
     a, b = regions.crossings.T
     ends = np.stack([labels[a], labels[b]], axis=1)
@@ -181,8 +181,7 @@ def _laid_out(
 
 def _check_areas(foam: Foam, mesh: TriangleMesh, labels: Ints) -> None:
     """Compare the foam's areas with the mesh regions': a film on the wrong side of a handle shows."""
-    rough = np.bincount(labels, mesh.node_areas, minlength=foam.n_bubbles)
-    rough *= foam.cell.surface.area / mesh.area
+    rough = np.bincount(labels, mesh.node_areas, foam.n_bubbles) * (foam.cell.surface.area / mesh.area)
     mean = foam.cell.surface.area / foam.n_bubbles
     per_node = mesh.area / mesh.n_nodes
     allowance = 0.5 * mean + 4.0 * np.sqrt(rough * per_node)
@@ -222,7 +221,8 @@ def _target_volumes(
         if width > 2.0:
             raise ValueError(f"volumes as a log-normal width must be at most 2, got {width:g}")
         drawn = np.exp(width * rng.standard_normal(count))
-        return cell.volume * drawn / drawn.sum()
+        shares: Floats = drawn / drawn.sum()
+        return cell.volume * shares
     given = as_floats(volumes, "volumes", (count,))
     if (given <= 0.0).any():
         raise ValueError(f"volumes must be above 0, but bubble {int(given.argmin())} has {given.min():g}")
@@ -232,7 +232,8 @@ def _target_volumes(
             f"volumes must add up to the cell's volume {cell.volume:.12g}, got {total:.12g}; "
             "multiply them by cell.volume / volumes.sum()"
         )
-    return given * (cell.volume / total)
+    scaled: Floats = given * (cell.volume / total)
+    return scaled
 
 
 def _nearest_nodes(mesh: TriangleMesh, points: Floats) -> Ints:

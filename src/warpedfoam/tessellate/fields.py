@@ -28,7 +28,8 @@ class SeedFields:
     def labels(self) -> Ints:
         """Seed that owns each node: least d²."""
         best = np.argmin(self.squares, axis=1)
-        return self.seeds[np.arange(len(best)), best]
+        out: Ints = self.seeds[np.arange(len(best)), best]
+        return out
 
     def square_to(self, nodes: Ints, seeds: Ints) -> tuple[Floats, Bools]:
         """d² from nodes to seeds (same shape), and whether it is known."""
@@ -63,7 +64,7 @@ def seed_fields(
     nodes = heat.mesh.nodes
     count = min(CANDIDATES, len(seeds))
     chord, near = cKDTree(seeds).query(nodes, k=count, workers=-1)
-    chord, near = chord.reshape(len(nodes), count), near.reshape(len(nodes), count)
+    chord, near = np.reshape(chord, (len(nodes), count)), np.reshape(near, (len(nodes), count))
     _, source = cKDTree(nodes).query(seeds)
     source = np.asarray(source, dtype=np.int64)
     colours = colour_seeds(seeds, APART * spacing)

@@ -16,8 +16,11 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 
 @dataclass(frozen=True, eq=False)
 class RegionNetwork:
-    """A network read off a mesh: ``corners`` (n_vertices,) are the triangles of three labels, in vertex
-    order; ``crossings`` (m, 2) the two-coloured mesh edges and ``film`` (m,) the film each lies on."""
+    """A network read off a mesh.
+
+    ``corners`` (n_vertices,) are the triangles of three labels, in vertex order; ``crossings`` (m, 2)
+    the two-coloured mesh edges and ``film`` (m,) the film each lies on.
+    """
 
     network: CellNetwork
     corners: Ints
@@ -165,4 +168,5 @@ def corner_weights(squares: Floats, known: Bools) -> Floats:
     sound = known & (np.abs(total[:, 0]) > 1e-300)
     weight = np.where(sound[:, None], weight / np.where(sound[:, None], total, 1.0), 1.0 / 3.0)
     weight = np.clip(weight, 0.05, None)
-    return weight / weight.sum(axis=1, keepdims=True)
+    out: Floats = weight / weight.sum(axis=1, keepdims=True)
+    return out
