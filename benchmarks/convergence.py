@@ -76,12 +76,12 @@ def draw(curves: list[Curve], reference: int, path: Path) -> None:
 
     figure, axes = plt.subplots(figsize=(6.4, 4.4), layout="constrained")
     for k, curve in enumerate(curves):
-        axes.semilogy(curve.orders, np.maximum(curve.energy, 1e-17), "o-", color=f"C{k}", label=curve.name)
-        axes.semilogy(curve.orders, np.maximum(curve.pressure, 1e-17), "s--", color=f"C{k}", mfc="w")
+        axes.semilogy(curve.orders, np.maximum(curve.energy, 1e-16), "o-", color=f"C{k}", label=curve.name)
+        axes.semilogy(curve.orders, np.maximum(curve.pressure, 1e-16), "s--", color=f"C{k}", mfc="w")
     axes.semilogy([], [], "o-", color="0.4", label="energy, relative")
     axes.semilogy([], [], "s--", color="0.4", mfc="w", label="pressures, γ/ℓ")
     axes.set(xlabel="film order p", ylabel=f"difference from p = {reference}")
-    axes.set(xticks=curves[0].orders, ylim=(1e-16, 1.0))
+    axes.set(xticks=curves[0].orders, ylim=(3e-17, 1.0))
     axes.grid(True, which="major", color="0.9")
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)

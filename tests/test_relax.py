@@ -274,4 +274,4 @@ def test_pardiso_agrees() -> None:
 def test_unknown_solver() -> None:
     """A solver that does not exist is a ValueError that lists those that do."""
     with pytest.raises(ValueError, match="superlu"):
-        factoriser("mumps")
+        factoriser("mumps", 100)

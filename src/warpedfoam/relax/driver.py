@@ -79,7 +79,7 @@ def relax(
         Of the residual, in γ d; at least 1e-13. Volumes are held to a hundredth of it, relative.
     max_iterations : int, optional
     solver : {"auto", "superlu", "pardiso"}, optional
-        Sparse solver; ``"auto"`` takes pardiso if the package pypardiso is installed.
+        Sparse solver; ``"auto"`` takes pardiso from 2000 bubbles if the package pypardiso is installed.
     progress : callable, optional
         Called as ``progress("relax", fraction)`` after each step.
 
@@ -107,7 +107,7 @@ def relax(
     tol = as_number(tolerance, "tolerance", minimum=1e-13)
     limit = as_integer(max_iterations, "max_iterations", minimum=0)
     p = foam.order if order is None else as_integer(order, "order", minimum=2, maximum=24)
-    method = factoriser(solver)
+    method = factoriser(solver, foam.n_bubbles)
     start = foam.with_order(p)
     system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles)
     clock = Stopwatch(system.timings)

@@ -16,6 +16,8 @@ from scipy.sparse.linalg import splu
 from warpedfoam.arrays import Floats, as_choice
 
 SOLVERS = ("auto", "superlu", "pardiso")
+#: Bubbles from which loading Pardiso pays for itself.
+PARDISO_FROM = 2000
 
 
 class Factor(Protocol):
@@ -74,8 +76,8 @@ class SuperLU:
         return SuperLUFactor(matrix)
 
 
-def factoriser(solver: str) -> Factoriser:
-    """The solver by name; ``"auto"`` takes pardiso where the package pypardiso is installed.
+def factoriser(solver: str, n_bubbles: int) -> Factoriser:
+    """The solver by name; ``"auto"`` takes pardiso for large foams where pypardiso is installed.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def factoriser(solver: str) -> Factoriser:
     present = importlib.util.find_spec("pypardiso") is not None
     if solver == "pardiso" and not present:
         raise ValueError("solver 'pardiso' needs the package pypardiso: pip install 'warpedfoam[fast]'")
-    if solver == "pardiso" or (solver == "auto" and present):
+    if solver == "pardiso" or (solver == "auto" and present and n_bubbles >= PARDISO_FROM):
         from warpedfoam.relax.pardiso import Pardiso
 
         return Pardiso()

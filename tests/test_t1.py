@@ -1,0 +1,568 @@
+"""T1s: four are none, charges stay, and the new film lies across the old one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpedfoam import CellNetwork, Foam, HeleShawCell, Sphere, TopologyError, Torus, network_from_loops, t1
+from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.moves.t1 import (
+    allowed,
+    independent,
+    lay_films,
+    local_energy,
+    outward_tangents,
+    pulls,
+    rewire,
+    t1_sites,
+)
+
+from .io_foams import sphere_foam, torus_foam, with_pressures
+
+NETWORKS = {
+    "sphere of 60": sphere_foam(60).network,
+    "sphere of 200": sphere_foam(200, seed=5).network,
+    "torus of 60": torus_foam(6, 10).network,
+    "torus of 160": torus_foam(8, 20).network,
+}
+EULER = {"sphere": 2, "torus": 0}
+
+each_network = pytest.mark.parametrize("name", NETWORKS)
+
+
+def every_site(network):
+    return t1_sites(network, np.arange(network.n_films))
+
+
+def may_turn(network):
+    return np.flatnonzero(allowed(network, every_site(network)))
+
+
+def same(one, two):
+    return all(
+        np.array_equal(getattr(one, k), getattr(two, k)) for k in ("next", "origin", "bubble", "bubble_euler")
+    )
+
+
+def prism(n):
+    low, high = list(range(n)), list(range(n, 2 * n))
+    return [low[::-1], high, *([i, (i + 1) % n, n + (i + 1) % n, n + i] for i in range(n))]
+
+
+# ---------------------------------------------------------------------------- the rewiring
+
+
+@each_network
+def test_sites_are_what_they_are_called(name):
+    net = NETWORKS[name]
+    s = every_site(net)
+    np.testing.assert_array_equal(s.c, s.a ^ 1)
+    np.testing.assert_array_equal(net.next[s.a0], s.a)
+    np.testing.assert_array_equal(net.next[s.a], s.a1)
+    np.testing.assert_array_equal(net.next[s.b0], s.c)
+    np.testing.assert_array_equal(net.next[s.c], s.b1)
+    beside = np.stack([net.left, net.right, net.bubble[s.a1 ^ 1], net.bubble[s.b1 ^ 1]], axis=1)
+    np.testing.assert_array_equal(s.bubbles, beside)
+    tail, head = net.origin[s.a], net.origin[s.c]
+    np.testing.assert_array_equal(net.origin[s.outer], np.stack([tail, tail, head, head], axis=1))
+    # with the film itself these are the three films of each end
+    at_tail = np.sort(np.stack([s.a, s.outer[:, 0], s.outer[:, 1]], axis=1), axis=1)
+    rows = np.searchsorted(np.unique(net.origin), tail)
+    np.testing.assert_array_equal(at_tail, np.sort(net.outgoing[rows], axis=1))
+
+
+@each_network
+def test_losers_lose_a_side_and_gainers_gain_one(name):
+    net = NETWORKS[name]
+    for film in may_turn(net)[::7]:
+        turned = rewire(net, [film])
+        expected = np.zeros(net.n_bubbles, dtype=int)
+        expected[[net.left[film], net.right[film]]] = -1
+        expected[every_site(net).bubbles[film, 2:]] = 1
+        np.testing.assert_array_equal(turned.sides - net.sides, expected)
+        assert sorted(every_site(turned).bubbles[film].tolist()) == sorted(
+            every_site(net).bubbles[film].tolist()
+        )
+        np.testing.assert_array_equal(
+            np.sort([turned.left[film], turned.right[film]]), np.sort(every_site(net).bubbles[film, 2:])
+        )
+
+
+@each_network
+def test_four_t1s_are_none(name):
+    net = NETWORKS[name]
+    tried = 0
+    for film in may_turn(net)[:: 1 + net.n_bubbles // 60]:
+        now, seen = net, []
+        for _ in range(4):
+            if not allowed(now, t1_sites(now, np.array([film])))[0]:
+                break
+            now = rewire(now, [film])
+            seen.append(now)
+        else:
+            tried += 1
+            assert same(now, net)
+            # two T1s turn the film round: the same network with its halves and ends exchanged
+            half = np.arange(2 * net.n_films)
+            half[[2 * film, 2 * film + 1]] = half[[2 * film + 1, 2 * film]]
+            twice = seen[1]
+            np.testing.assert_array_equal(half[twice.next[half]], net.next)
+            np.testing.assert_array_equal(twice.bubble[half], net.bubble)
+            vertex = np.arange(net.n_vertices)
+            ends = [net.tails[film], net.heads[film]]
+            vertex[ends] = ends[::-1]
+            np.testing.assert_array_equal(vertex[twice.origin[half]], net.origin)
+            assert not same(seen[0], net)
+            assert not same(seen[1], net)
+    assert tried > 20
+
+
+@each_network
+def test_four_sweeps_of_many_t1s_are_none(name):
+    net = NETWORKS[name]
+    sites = every_site(net)
+    fine = allowed(net, sites) & (net.sides[sites.bubbles].min(axis=1) >= 5)
+    films = np.flatnonzero(fine)
+    chosen = films[independent(t1_sites(net, films), np.random.default_rng(0).random(len(films)))]
+    assert len(chosen) >= 3
+    now = net
+    for _ in range(4):
+        now = rewire(now, chosen)
+    assert same(now, net)
+
+
+@each_network
+def test_charges_add_up_after_each_of_thousands_of_t1s(name):
+    """One film after the other: 1000 random T1s on each of four networks, validated each time."""
+    net = NETWORKS[name]
+    total = int(net.charges.sum())
+    assert total == 6 * EULER[name.split()[0]]
+    rng = np.random.default_rng(1)
+    before = net.sides
+    done = 0
+    while done < 1000:
+        film = rng.integers(net.n_films)
+        sites = t1_sites(net, np.array([film]))
+        if not allowed(net, sites)[0]:
+            with pytest.raises(TopologyError, match="cannot turn"):
+                rewire(net, [film])
+            continue
+        net = rewire(net, [film])  # CellNetwork checks all its rules
+        done += 1
+        change = net.sides - before
+        assert sorted(change[change != 0].tolist()) == [-1, -1, 1, 1]
+        before = net.sides
+        assert int(net.charges.sum()) == total
+        assert net.sides.min() >= 3
+    assert net.euler_characteristic == EULER[name.split()[0]]
+    assert (net.n_vertices, net.n_films) == (NETWORKS[name].n_vertices, NETWORKS[name].n_films)
+
+
+@each_network
+def test_charges_add_up_after_sweeps_of_many_t1s_at_once(name):
+    net = NETWORKS[name]
+    total, made = int(net.charges.sum()), 0
+    rng = np.random.default_rng(2)
+    for _ in range(150):
+        films = may_turn(net)
+        sites = t1_sites(net, films)
+        chosen = films[independent(sites, rng.random(len(films)))]
+        before = net.sides
+        one_by_one = net
+        net = rewire(net, chosen)
+        made += len(chosen)
+        assert int(net.charges.sum()) == total
+        four = t1_sites(one_by_one, chosen).bubbles
+        np.testing.assert_array_equal((net.sides - before)[four], np.tile([-1, -1, 1, 1], (len(chosen), 1)))
+        if made < 200:
+            for film in rng.permutation(chosen):  # in any order, one by one, it is the same
+                one_by_one = rewire(one_by_one, [film])
+            assert same(one_by_one, net)
+    assert made > 400
+
+
+def test_networks_are_not_changed_by_their_t1s():
+    net = NETWORKS["sphere of 60"]
+    before = [np.array(a) for a in (net.next, net.origin, net.bubble)]
+    rewire(net, may_turn(net)[:1])
+    for was, now in zip(before, (net.next, net.origin, net.bubble), strict=True):
+        np.testing.assert_array_equal(was, now)
+
+
+# ---------------------------------------------------------------------------- choosing
+
+
+@each_network
+def test_chosen_sites_share_no_bubble_and_one_is_always_chosen(name):
+    net = NETWORKS[name]
+    rng = np.random.default_rng(3)
+    for count in (1, 2, 5, 40, net.n_films):
+        films = rng.choice(net.n_films, count, replace=False)
+        sites = t1_sites(net, films)
+        for priority in (rng.random(count), np.zeros(count), rng.integers(0, 3, count) * 1.0):
+            chosen = independent(sites, priority)
+            assert chosen.shape == (count,)
+            assert chosen.any()
+            assert chosen[np.argmax(priority)] or (priority == priority.max()).sum() > 1
+            distinct = [set(four.tolist()) for four in sites.bubbles[chosen]]
+            assert sum(map(len, distinct)) == len(set().union(*distinct))
+
+
+def test_nothing_to_choose_from():
+    net = NETWORKS["torus of 60"]
+    assert independent(t1_sites(net, np.zeros(0, dtype=int)), np.zeros(0)).shape == (0,)
+
+
+def test_no_site_left_out_is_better_than_all_its_rivals():
+    net = NETWORKS["torus of 160"]
+    rng = np.random.default_rng(4)
+    films = rng.choice(net.n_films, 100, replace=False)
+    sites, priority = t1_sites(net, films), rng.random(100)
+    chosen = independent(sites, priority)
+    for i in np.flatnonzero(~chosen):
+        rivals = np.isin(sites.bubbles, sites.bubbles[i]).any(axis=1)
+        assert priority[rivals].max() > priority[i]
+
+
+# ---------------------------------------------------------------------------- refusals
+
+
+def test_three_sided_bubbles_lose_nothing():
+    tetrahedron = network_from_loops([(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)])
+    assert may_turn(tetrahedron).size == 0
+    for film in range(6):
+        with pytest.raises(TopologyError, match=f"film {film} cannot turn.*at least four sides"):
+            rewire(tetrahedron, [film])
+    prism3 = network_from_loops(prism(3))
+    # only films between two of the 4-sided bubbles may turn, and their ends lie on the triangles
+    assert (prism3.sides[np.stack([prism3.left, prism3.right])[:, may_turn(prism3)]] == 4).all()
+    assert len(may_turn(prism3)) == 3
+
+
+def test_a_cube_turns_into_two_triangles_and_two_pentagons_and_so_on():
+    cube = network_from_loops(prism(4))
+    assert len(may_turn(cube)) == 12
+    for film in range(12):
+        assert sorted(rewire(cube, [film]).sides.tolist()) == [3, 3, 4, 4, 5, 5]
+
+
+def test_markers_do_not_turn():
+    lens = CellNetwork([2, 3, 0, 1], [0, 1, 1, 0], [0, 1, 0, 1])
+    for film in (0, 1):
+        with pytest.raises(TopologyError, match=rf"film {film} cannot turn.*threefold"):
+            rewire(lens, [film])
+    # a cube with a marker on one film: its two parts may not turn, the rest may
+    loops = [
+        [
+            v
+            for i, v in enumerate(ring)
+            for v in ([v, 8] if (v, ring[(i + 1) % len(ring)]) in ((0, 1), (1, 0)) else [v])
+        ]
+        for ring in prism(4)
+    ]
+    net = network_from_loops(loops)
+    assert net.markers.tolist() == [8]
+    at_marker = np.flatnonzero((net.tails == 8) | (net.heads == 8))
+    assert len(at_marker) == 2
+    assert sorted(set(range(13)) - set(may_turn(net).tolist())) == at_marker.tolist()
+    for film in at_marker:
+        with pytest.raises(TopologyError, match="cannot turn"):
+            rewire(net, [film])
+
+
+def bricks(rows, columns):
+    """Loops of bricks on a torus, as in `io_foams.torus_foam`, without coordinates."""
+    corner = lambda i, j: (i % rows) * 2 * columns + j % (2 * columns)  # noqa: E731
+    loops = []
+    for i in range(rows):
+        for k in range(columns):
+            j = 2 * k + i % 2
+            above = [corner(i + 1, j + s) for s in (0, 1, 2)]
+            loops.append([corner(i, j + s) for s in (0, 1, 2)] + above[::-1])
+    return loops
+
+
+def test_a_film_whose_ends_meet_the_same_bubble_does_not_turn():
+    """Two rows of bricks round a tube: a brick above is the brick below as well."""
+    net = network_from_loops(bricks(2, 5))
+    assert net.sides.tolist() == [6] * 10
+    assert net.euler_characteristic == 0
+    four = every_site(net).bubbles
+    twice = four[:, 2] == four[:, 3]
+    assert twice.sum() == 10  # the uprights
+    for film in np.flatnonzero(twice):
+        with pytest.raises(TopologyError, match="bubbles must be different disks"):
+            rewire(net, [film])
+    assert not twice[may_turn(net)].any()
+
+
+def test_a_lens_and_the_film_beside_it():
+    """Of a foam of two lenses and two bubbles only the films that join the lenses may turn."""
+    net = network_from_loops([(1, 0, 4), (2, 3, 5), (0, 1, 3, 2), (1, 4, 0, 2, 5, 3)])
+    assert net.sides.tolist() == [2, 2, 4, 4]
+    films = may_turn(net)
+    assert {frozenset((int(net.left[f]), int(net.right[f]))) for f in films} == {frozenset((2, 3))}
+    for film in films:
+        assert rewire(net, [film]).sides.tolist() == [3, 3, 3, 3]
+
+
+def test_bubbles_that_are_no_disks_take_no_part():
+    net = NETWORKS["torus of 60"]
+    euler = np.array(net.bubble_euler)
+    # declare two bubbles something else; the sum, and with it the surface, does not matter here
+    euler[0] = -1
+    other = CellNetwork(net.next, net.origin, net.bubble, euler)
+    gone = np.setdiff1d(may_turn(net), may_turn(other))
+    assert gone.size > 0
+    assert (every_site(net).bubbles[gone] == 0).any(axis=1).all()
+
+
+def test_t1s_that_share_a_bubble_are_made_one_after_the_other():
+    net = NETWORKS["torus of 60"]
+    films = may_turn(net)
+    first = films[0]
+    four = t1_sites(net, films).bubbles
+    near = films[np.isin(four, four[0]).any(axis=1)]
+    for other in (*near[1:4], first):
+        with pytest.raises(TopologyError, match="share a bubble; make them one after the other"):
+            rewire(net, [first, other])
+
+
+@pytest.mark.parametrize(
+    ("films", "fault", "message"),
+    [
+        ([-1], ValueError, "films must be at least 0 and below 180"),
+        ([180], ValueError, "films must be at least 0 and below 180"),
+        ([1.0], TypeError, "films must hold integers"),
+        ([True], TypeError, "films must hold integers"),
+        (3, ValueError, "films must have shape"),
+        ([[3]], ValueError, "films must have shape"),
+        (None, TypeError, "films must hold integers"),
+    ],
+)
+def test_films_that_are_none(films, fault, message):
+    with pytest.raises(fault, match=message):
+        rewire(NETWORKS["torus of 60"], films)
+
+
+def test_no_t1s_at_all():
+    net = NETWORKS["torus of 60"]
+    assert same(rewire(net, np.zeros(0, dtype=int)), net)
+
+
+# ---------------------------------------------------------------------------- laid out in a foam
+
+FOAMS = {
+    "sphere": with_pressures(sphere_foam(60, even=True)),
+    "torus": with_pressures(torus_foam(6, 10)),
+    "thin torus": torus_foam(6, 24, major_radius=6.0),
+}
+each_foam = pytest.mark.parametrize("name", FOAMS)
+
+
+def direction(foam, film):
+    points = foam.vertex_points
+    chord = points[foam.network.heads[film]] - points[foam.network.tails[film]]
+    return chord / np.linalg.norm(chord)
+
+
+def middle(foam, film):
+    ends = foam.vertex_points[[foam.network.tails[film], foam.network.heads[film]]]
+    return foam.cell.surface.project(ends.mean(axis=0)[None])[0]
+
+
+@each_foam
+def test_the_new_film_lies_across_the_old_one(name):
+    foam = FOAMS[name]
+    surface, size = foam.cell.surface, foam.bubble_size
+    for film in may_turn(foam.network)[::5]:
+        turned = t1(foam, int(film))
+        assert same(turned.network, rewire(foam.network, [film]))
+        assert abs(direction(turned, film) @ direction(foam, film)) < 0.5  # nearer to 90° than 60°
+        np.testing.assert_allclose(middle(turned, film), middle(foam, film), atol=0.01 * size)
+        assert turned.film_lengths[film] == pytest.approx(0.1 * size, rel=0.06)
+        np.testing.assert_allclose(surface.project(turned.vertex_points), turned.vertex_points, atol=1e-13)
+        five = [film, *(t1_sites(foam.network, np.array([film])).outer[0] >> 1)]
+        np.testing.assert_array_equal(turned.film_offsets[five], 0.0)
+        others = np.setdiff1d(np.arange(foam.network.n_films), five)
+        np.testing.assert_array_equal(turned.film_offsets[others], foam.film_offsets[others])
+        np.testing.assert_array_equal(turned.film_areas[others], foam.film_areas[others])
+        ends = [foam.network.tails[film], foam.network.heads[film]]
+        still = np.setdiff1d(np.arange(foam.network.n_vertices), ends)
+        np.testing.assert_array_equal(turned.vertex_points[still], foam.vertex_points[still])
+
+
+@each_foam
+def test_the_tail_goes_to_the_side_of_the_films_that_now_start_there(name):
+    """Neighbours grow shorter or stay, they never cross: the new film points tail → its two neighbours."""
+    foam = FOAMS[name]
+    for film in may_turn(foam.network)[::5]:
+        turned = t1(foam, int(film), length=0.02 * foam.bubble_size)
+        sites = t1_sites(turned.network, np.array([film]))
+        tangents = outward_tangents(
+            turned.cell.surface, turned.network, turned.vertex_points, turned.film_offsets, sites.outer
+        )
+        pull = pulls(tangents)[0][0]
+        assert -direction(turned, film) @ pull / np.linalg.norm(pull) > 0.9
+        # films round both ends keep their order round the vertex
+        out = turned.network.outgoing
+        rows = np.isin(turned.network.origin[out[:, 0]], turned.network.origin[[2 * film, 2 * film + 1]])
+        halves = out[rows]
+        tangent = outward_tangents(
+            turned.cell.surface, turned.network, turned.vertex_points, turned.film_offsets, halves
+        )
+        normal = turned.cell.surface.normals(turned.vertex_points[turned.network.origin[halves[:, 0]]])
+        for k in range(3):
+            turn = np.cross(tangent[:, k], tangent[:, (k + 1) % 3])
+            assert (np.einsum("va,va->v", turn, normal) > 0).all()
+
+
+@each_foam
+def test_t1s_hold_volumes_ids_and_the_surface(name):
+    foam = FOAMS[name]
+    for film in may_turn(foam.network)[::11]:
+        turned = t1(foam, int(film))
+        assert turned.bubble_areas.sum() == pytest.approx(foam.cell.surface.area, rel=1e-13)
+        assert turned.bubble_volumes.sum() == pytest.approx(foam.cell.volume, rel=1e-13)
+        assert (turned.bubble_areas > 0).all()
+        np.testing.assert_array_equal(turned.target_volumes, foam.target_volumes)
+        np.testing.assert_array_equal(turned.bubble_ids, foam.bubble_ids)
+        assert turned.pressures is None
+        assert (turned.tension, turned.seed, turned.cell) == (foam.tension, foam.seed, foam.cell)
+        four = t1_sites(foam.network, np.array([film])).bubbles[0]
+        others = np.setdiff1d(np.arange(foam.n_bubbles), four)
+        around = np.unique(foam.network.bubble[t1_sites(foam.network, np.array([film])).outer[0]])
+        untouched = np.setdiff1d(others, around)
+        np.testing.assert_allclose(turned.bubble_areas[untouched], foam.bubble_areas[untouched], rtol=1e-12)
+
+
+@pytest.mark.parametrize("length", [0.01, 0.05, 0.3])
+@each_foam
+def test_the_length_is_what_was_asked_for(name, length):
+    foam = FOAMS[name]
+    film = int(may_turn(foam.network)[0])
+    turned = t1(foam, film, length=length * foam.bubble_size)
+    assert turned.film_lengths[film] == pytest.approx(length * foam.bubble_size, rel=0.06)
+
+
+def test_a_t1_and_back_has_the_old_energy_once_the_film_is_laid_as_it_was():
+    foam = FOAMS["thin torus"]
+    film = int(may_turn(foam.network)[3])
+    sites = t1_sites(foam.network, np.array([film]))
+    tail, head = foam.network.tails[film], foam.network.heads[film]
+    along = (foam.vertex_points[tail] - foam.vertex_points[head])[None]
+    points, offsets = lay_films(
+        foam.cell.surface,
+        foam.network,
+        foam.vertex_points,
+        foam.film_offsets,
+        sites,
+        along,
+        np.linalg.norm(along, axis=1),
+    )
+    # laid along its own chord a film comes back to where it was, up to the chord's height squared
+    assert np.abs(points - foam.vertex_points).max() < 0.1 * foam.bubble_size
+    assert np.array_equal(offsets, foam.film_offsets)
+    assert local_energy(foam, np.array([film]))[0] > 0
+
+
+@each_foam
+def test_local_energy_is_the_energy_of_five_films(name):
+    foam = FOAMS[name]
+    films = may_turn(foam.network)[::9]
+    for film, energy in zip(films, local_energy(foam, films), strict=True):
+        touching = np.flatnonzero(
+            np.isin(foam.network.tails, [foam.network.tails[film], foam.network.heads[film]])
+            | np.isin(foam.network.heads, [foam.network.tails[film], foam.network.heads[film]])
+        )
+        assert len(touching) == 5
+        assert energy == pytest.approx(foam.tension * foam.film_areas[touching].sum(), rel=1e-13)
+
+
+@each_foam
+def test_tangents_point_along_the_films_away_from_their_start(name):
+    foam = FOAMS[name]
+    net = foam.network
+    halves = np.arange(2 * net.n_films)
+    tangents = outward_tangents(foam.cell.surface, net, foam.vertex_points, foam.film_offsets, halves)
+    np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1.0, atol=1e-13)
+    curves = foam.film_curves_at(np.array([0.0, 1e-6, 1.0 - 1e-6, 1.0]))
+    ahead = np.empty_like(tangents)
+    ahead[0::2], ahead[1::2] = curves[:, 1] - curves[:, 0], curves[:, 2] - curves[:, 3]
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    assert np.abs(ahead - tangents).max() < 0.01  # the polynomial through p + 1 points of the curve
+    assert lobatto(foam.order).order == 4
+
+
+def test_the_larger_pull_wins():
+    """Four films in the plane at the corners of a rectangle: the long way of the rectangle pulls."""
+    for a, b in ((2.0, 1.0), (1.0, 2.0)):
+        # outgoing at the tail (left): twin(a0), b1; at the head (right): a1, twin(b0)
+        corners = np.array([[-a, b, 0], [-a, -b, 0], [a, b, 0], [a, -b, 0]])
+        corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+        now, turned = (np.linalg.norm(v[0]) for v in pulls(corners[None]))
+        assert (now > turned) == (a > b)
+
+
+def test_dissociating_a_fourfold_vertex_the_right_way_lowers_the_energy():
+    """A short film between far bubbles: after the T1 the five films are shorter iff the pull is larger."""
+    foam = FOAMS["torus"]
+    surface, net = foam.cell.surface, foam.network
+    short = 0.004 * foam.bubble_size
+    films = may_turn(net)[::3]
+    agreed = 0
+    for film in films:
+        sites = t1_sites(net, np.array([film]))
+        points, offsets = foam.vertex_points, foam.film_offsets
+        for _ in range(2):  # once to shrink the film, once more along the pull on the short one
+            tangents = outward_tangents(surface, net, points, offsets, sites.outer)
+            now, after = pulls(tangents)
+            points, offsets = lay_films(surface, net, points, offsets, sites, now, np.array([short]))
+        before = Foam(foam.cell, net, points, offsets)
+        points, offsets = lay_films(surface, net, points, offsets, sites, after, np.array([short]))
+        turned = Foam(foam.cell, rewire(net, [film]), points, offsets)
+        gain = np.linalg.norm(after) - np.linalg.norm(now)
+        if abs(gain) > 0.1:
+            agreed += 1
+            change = turned.film_areas.sum() - before.film_areas.sum()
+            # dE/dlength = 1 − |pull| / 2 for each
+            assert change == pytest.approx(-0.5 * gain * short * foam.cell.gap, rel=0.3)
+    assert agreed > 5
+
+
+@pytest.mark.parametrize(
+    ("film", "fault", "message"),
+    [
+        (-1, ValueError, "film must be at least 0"),
+        (10**6, ValueError, "film must be at least 0 and below"),
+        (1.0, TypeError, "film must hold integers"),
+        (True, TypeError, "film must hold integers"),
+        ("0", TypeError, "film must hold integers"),
+        (None, TypeError, "film must hold integers"),
+    ],
+)
+def test_no_such_film(film, fault, message):
+    with pytest.raises(fault, match=message):
+        t1(FOAMS["sphere"], film)
+
+
+def test_films_that_may_not_turn():
+    cell = HeleShawCell(Sphere(1.0), 0.1)
+    points = [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]]
+    tetrahedron = Foam.from_loops(cell, points, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
+    with pytest.raises(TopologyError, match="at least four sides"):
+        t1(tetrahedron, 0)
+
+
+@pytest.mark.xfail(reason="t1 takes whatever length it is given", strict=True)
+@pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), "1", [1.0]])
+def test_bad_lengths(length):
+    with pytest.raises((ValueError, TypeError), match="length must be"):
+        t1(FOAMS["sphere"], int(may_turn(FOAMS["sphere"].network)[0]), length=length)
+
+
+@pytest.mark.xfail(reason="t1 does not look at what it is given", raises=AttributeError, strict=True)
+def test_no_foam():
+    with pytest.raises(TypeError, match="foam must be a Foam"):
+        t1(Torus(3.0, 1.0), 0)
