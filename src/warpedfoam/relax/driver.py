@@ -12,6 +12,7 @@ from warpedfoam.arrays import as_flag, as_integer, as_number, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.condense import Condensed
 from warpedfoam.moves.t1 import T1Event
+from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.linear import factoriser
 from warpedfoam.relax.result import Relaxation
 from warpedfoam.relax.sweep import plan_sweep, realigned, turned
@@ -32,6 +33,10 @@ SOFTNESS, VOLUME_STEP = 0.02, 0.15
 VERTEX_CAP, OFFSET_CAP = 0.3, 0.2
 #: Exact Newton starts below the first residual, is left above the second, steps no farther than the third.
 EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
+#: Shifts of the exact steps, in γ d / ℓ.
+LEAST_SHIFT, MOST_SHIFT = 1e-10, 0.03
+#: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
+SADDLE, KICK = 1e-6, 0.05
 
 
 @dataclass
@@ -159,10 +164,13 @@ def _iterate(
             # the mean digit count of the vertices' residuals grows almost evenly with time
             progress("relax", float(-np.log10(np.clip(now.vertex, 1e-5, 1.0)).mean()) / 5.0)
         done = now.force <= tolerance and now.volume_error <= max(0.01 * tolerance, 1e-12)
-        if done or run.iteration >= limit or not np.isfinite(now.force):
-            if np.isfinite(now.force):
-                run.is_minimum = _is_minimum(run, lin)
-            return now, done and run.is_minimum
+        if not np.isfinite(now.force):
+            return now, False
+        if done or run.iteration >= limit:
+            condensed = lin.condensed(positive=False)
+            run.is_minimum = _is_minimum(lin, _kkt(run, lin, condensed, LEAST_SHIFT), condensed)
+            if run.is_minimum or run.iteration >= limit:
+                return now, done and run.is_minimum
         error = float(np.abs(now.volume).max())
         if not exact:
             exact = now.force < EXACT_BELOW and error < EXACT_BELOW
@@ -183,7 +191,7 @@ def _proximal_step(run: _Run, lin: Linearised) -> None:
     fault = np.clip(lin.residuals.volume, -VOLUME_STEP, VOLUME_STEP)
     softness = np.full(network.n_bubbles, SOFTNESS)
     condensed = lin.condensed(positive=True)
-    step, _ = lin.solve(condensed, np.repeat(shift[:, None], 2, axis=1), softness, fault)
+    step = KKT(lin, condensed, np.repeat(shift, 2), softness).step(fault)
     size = np.linalg.norm(step.vertices, axis=1, keepdims=True)
     vertices = step.vertices * np.minimum(1.0, VERTEX_CAP / np.maximum(size, 1e-300))
     bend = np.abs(step.offsets).max(axis=1, initial=0.0, keepdims=True)
@@ -213,36 +221,43 @@ def _advance(run: _Run, step: Step) -> None:
 def _exact_step(run: _Run, lin: Linearised) -> None:
     """One step on the KKT system, shifted until its inertia is right and scaled to a safe length."""
     now = lin.residuals
-    shift = float(np.clip(0.05 * now.force, 1e-10, 0.03))
+    shift = float(np.clip(0.05 * now.force, LEAST_SHIFT, MOST_SHIFT))
     condensed = lin.condensed(positive=False)
-    while True:
-        step, right = _kkt_step(run, lin, condensed, shift)
-        if right or shift >= 1.0:
-            break
-        shift = max(10.0 * shift, 1e-3)
-    size = max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
-    if not right or not np.isfinite(size):
+    kkt = _kkt(run, lin, condensed, shift)
+    first = kkt
+    while not (right := _is_minimum(lin, kkt, condensed)) and shift < 1.0:
+        shift = max(10.0 * shift, 1e-6)
+        kkt = _kkt(run, lin, condensed, shift)
+    step = kkt.step(now.volume) if right else None
+    size = 0.0
+    if step is not None:
+        size = max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
+    if step is None or not np.isfinite(size):
         _proximal_step(run, lin)
         return
+    if kkt is not first and now.force < SADDLE:
+        # next to a saddle the force gives no way out: take the mode that goes down
+        mode = kkt.softest_mode(step.vertices)
+        side = 1.0 if float((mode * step.vertices).sum()) >= 0.0 else -1.0
+        step = Step(step.vertices + side * KICK * mode, step.offsets, step.pressures)
+        size = max(size, KICK)
     share = min(1.0, EXACT_STEP / max(size, 1e-300))
     _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
 
 
-def _kkt_step(run: _Run, lin: Linearised, condensed: Condensed, shift: float) -> tuple[Step, bool]:
-    """Newton step with shift σ on the vertices, rigid motions pinned; and whether its inertia is right."""
+def _kkt(run: _Run, lin: Linearised, condensed: Condensed, shift: float) -> KKT:
+    """Newton matrix with shift σ on the vertices, rigid motions and the redundant constraint pinned."""
     network = run.state.network
     vertex = np.full(2 * network.n_vertices, shift)
     vertex[run.pins] += 1.0
     pressure = np.zeros(network.n_bubbles)
     pressure[0] = 1.0  # the volumes add up to the cell's: one constraint is redundant
-    step, factor = lin.solve(condensed, vertex.reshape(-1, 2), pressure, lin.residuals.volume)
-    return step, factor.n_negative == network.n_bubbles and not condensed.negative.any()
+    return KKT(lin, condensed, vertex, pressure)
 
 
-def _is_minimum(run: _Run, lin: Linearised) -> bool:
-    """Whether the Hessian at this state, rigid motions pinned, has the inertia of a minimum."""
-    _, right = _kkt_step(run, lin, lin.condensed(positive=False), 1e-10)
-    return right
+def _is_minimum(lin: Linearised, kkt: KKT, condensed: Condensed) -> bool:
+    """Whether the matrix has the inertia of a minimum: one negative eigenvalue for each volume."""
+    return kkt.n_negative == lin.state.network.n_bubbles and not condensed.negative.any()
 
 
 def _moved(run: _Run, step: Step) -> State:

@@ -18,7 +18,7 @@ from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.moves.t1 import outward_tangents
 from warpedfoam.network import CellNetwork
-from warpedfoam.relax.linear import Factor, Factoriser
+from warpedfoam.relax.linear import Factoriser
 from warpedfoam.relax.pattern import Pattern
 
 #: Least stiffness of an offset in a proximal step, relative to a straight film of the same length.
@@ -206,44 +206,6 @@ class Linearised:
             out.matrix[:4, :4] = clip_to_positive(out.matrix[:4, :4])
         clock.lap("assemble")
         return out
-
-    def solve(
-        self,
-        condensed: Condensed,
-        vertex_shift: Floats,
-        pressure_shift: Floats,
-        volume_fault: Floats,
-    ) -> tuple[Step, Factor]:
-        """Solve [H + σ, −B; −Bᵀ, −ε](dv, dp) = (−r, V − V*), and recover the offsets.
-
-        ``vertex_shift`` (n_vertices, 2) is σ, ``pressure_shift`` (n_bubbles,) is ε.
-        """
-        system, network = self.system, self.state.network
-        pattern = system.pattern(network)
-        clock = Stopwatch(system.timings)
-        sign = np.array([1.0, 1.0, 1.0, 1.0, 1.0, -1.0])
-        rows = np.array([0, 1, 2, 3, 4, 4])
-        blocks = condensed.matrix[np.ix_(rows, rows)]
-        blocks *= (sign[:, None] * sign)[..., None]
-        shifts = np.concatenate([vertex_shift.ravel(), -pressure_shift])
-        matrix = pattern.matrix(blocks, shifts)
-        rhs = pattern.gather(condensed.rhs[rows] * sign[:, None])
-        rhs[2 * network.n_vertices :] += volume_fault
-        ordered = pattern.ordered(rhs)
-        clock.lap("assemble")
-        factor = system.factoriser.factor(matrix, pattern)
-        x = factor.solve(ordered)
-        x += factor.solve(ordered - matrix @ x)
-        clock.lap("solve")
-        solution = pattern.restored(x)
-        split = 2 * network.n_vertices
-        dv, dp = solution[:split].reshape(-1, 2), solution[split:]
-        kept = np.concatenate(
-            [dv[network.tails].T, dv[network.heads].T, (dp[network.left] - dp[network.right])[None]]
-        )
-        offsets = condensed.recover(kept).T
-        clock.lap("assemble")
-        return Step(dv, np.ascontiguousarray(offsets), dp), factor
 
 
 def one_ring(network: CellNetwork, values: Floats) -> Floats:
