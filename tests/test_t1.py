@@ -530,7 +530,7 @@ def test_dissociating_a_fourfold_vertex_the_right_way_lowers_the_energy():
             agreed += 1
             change = turned.film_areas.sum() - before.film_areas.sum()
             # dE/dlength = 1 − |pull| / 2 for each
-            assert change == pytest.approx(-0.5 * gain * short * foam.cell.gap, rel=0.1)
+            assert change == pytest.approx(-0.5 * gain * short * foam.cell.gap, rel=0.15)
     assert agreed > 5
 
 

@@ -27,7 +27,7 @@ from warpedfoam.relax.system import (
     pinned_unknowns,
 )
 
-#: Compressibility of the proximal steps, in ℓ³ w² / γ, and the largest volume error they aim at.
+#: Compressibility of the proximal steps, in ℓ³ w² / γ, and the largest share of a volume they correct.
 SOFTNESS, VOLUME_STEP = 0.02, 0.15
 #: Largest changes in one proximal step: of a vertex (in ℓ), of an offset.
 VERTEX_CAP, OFFSET_CAP = 0.3, 0.2
@@ -171,7 +171,7 @@ def _iterate(
             run.is_minimum = _is_minimum(lin, _kkt(run, lin, condensed, LEAST_SHIFT), condensed)
             if run.is_minimum or run.iteration >= limit:
                 return now, done and run.is_minimum
-        error = float(np.abs(now.volume).max())
+        error = float(np.abs(now.volume / run.system.shares).max())
         if not exact:
             exact = now.force < EXACT_BELOW and error < EXACT_BELOW
         elif now.force > EXACT_ABOVE:
@@ -188,8 +188,11 @@ def _proximal_step(run: _Run, lin: Linearised) -> None:
     network = run.state.network
     residual = one_ring(network, lin.residuals.vertex)
     shift = np.maximum(1e-5, residual / 0.15 * np.minimum(1.0, residual / 0.5))
-    fault = np.clip(lin.residuals.volume, -VOLUME_STEP, VOLUME_STEP)
-    softness = np.full(network.n_bubbles, SOFTNESS)
+    # a bubble's compressibility goes with its size cubed: small ones must be held as firmly
+    shares = run.system.shares
+    most = VOLUME_STEP * np.maximum(shares, lin.volumes)
+    fault = np.clip(lin.residuals.volume, -most, most)
+    softness = SOFTNESS * shares**1.5
     condensed = lin.condensed(positive=True)
     step = KKT(lin, condensed, np.repeat(shift, 2), softness).step(fault)
     size = np.linalg.norm(step.vertices, axis=1, keepdims=True)
@@ -203,7 +206,10 @@ def _advance(run: _Run, step: Step) -> None:
     """Apply a step film by film limited, then turn and realign films."""
     clock = Stopwatch(run.system.timings)
     cell, length = run.system.cell, run.system.length
-    sweep = plan_sweep(cell, run.state, step, length, run.turns, t1=run.t1)
+    network = run.state.network
+    smaller = np.minimum(run.system.shares[network.left], run.system.shares[network.right])
+    scale = np.minimum(1.0, np.sqrt(smaller))
+    sweep = plan_sweep(cell, run.state, step, length, run.turns, scale, t1=run.t1)
     limited = Step(step.vertices * sweep.limit[:, None], step.offsets, step.pressures)
     state = _moved(run, limited)
     if sweep.failing.size:

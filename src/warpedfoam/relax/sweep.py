@@ -42,14 +42,23 @@ class Sweep:
     along: Floats
     current: Floats
     limit: Floats
+    scale: Floats
 
 
 def plan_sweep(
-    cell: HeleShawCell, state: State, step: Step, length: float, turns: Ints, *, t1: bool
+    cell: HeleShawCell,
+    state: State,
+    step: Step,
+    length: float,
+    turns: Ints,
+    scale: Floats,
+    *,
+    t1: bool,
 ) -> Sweep:
     """Find films that the step would make vanish, and decide which of them turn.
 
-    A film fails if its chord would shrink below ``SHORT`` bubble sizes or reverse. It turns if the
+    A film fails if its chord would shrink below ``SHORT`` bubble sizes (times ``scale``, which is
+    less beside small bubbles) or reverse. It turns if the
     pull of its neighbours on the turned film is greater than on it, ``turns`` counting its earlier
     T1s. All other films keep half of their chord.
     """
@@ -60,7 +69,7 @@ def plan_sweep(
     was = np.linalg.norm(old, axis=1) / length
     now = np.linalg.norm(new, axis=1) / length
     reversed_ = np.einsum("fi,fi->f", old, new) < 0.0
-    fails = ((now < SHORT) & (now < was)) | reversed_
+    fails = ((now < SHORT * scale) & (now < was)) | reversed_
     shrink = np.where(reversed_, was + now, was - now)
     share = np.where(shrink > 0.5 * was, 0.5 * was / np.maximum(shrink, 1e-300), 1.0)
     failing = np.flatnonzero(fails)
@@ -85,7 +94,7 @@ def plan_sweep(
     limit = np.ones(network.n_vertices)
     np.minimum.at(limit, network.tails, share)
     np.minimum.at(limit, network.heads, share)
-    return Sweep(failing, collapsing, turning, along, current, limit)
+    return Sweep(failing, collapsing, turning, along, current, limit, scale)
 
 
 def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> State:
@@ -95,8 +104,9 @@ def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> 
     network = state.network
     chord = state.points[network.tails[films]] - state.points[network.heads[films]]
     span = np.linalg.norm(chord, axis=1)
-    lost = (np.einsum("ki,ki->k", chord, pull) < 0.0) | (span < 0.5 * SHORT * length)
-    films, pull, span = films[lost], pull[lost], np.maximum(span[lost], 0.5 * SHORT * length)
+    least = 0.5 * SHORT * length * sweep.scale[films]
+    lost = (np.einsum("ki,ki->k", chord, pull) < 0.0) | (span < least)
+    films, pull, span = films[lost], pull[lost], np.maximum(span, least)[lost]
     if not films.size:
         return state
     sites = t1_sites(network, films)
@@ -122,7 +132,8 @@ def turned(
     five = np.concatenate([films[:, None], sites.outer >> 1], axis=1)
     before = _energies(cell, state, five)
     chord = np.linalg.norm(state.points[network.tails[films]] - state.points[network.heads[films]], axis=1)
-    span = np.maximum(NEW_LENGTH[0] * length, np.minimum(chord, NEW_LENGTH[1] * length))
+    unit = length * sweep.scale[films]
+    span = np.maximum(NEW_LENGTH[0] * unit, np.minimum(chord, NEW_LENGTH[1] * unit))
     points, offsets = lay_films(cell.surface, network, state.points, state.offsets, sites, sweep.along, span)
     after_state = State(rewire(network, films), points, offsets, state.pressures)
     after = _energies(cell, after_state, five)

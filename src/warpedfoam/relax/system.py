@@ -81,6 +81,7 @@ class System:
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.film_unit = float(cell.layer.shares.sum()) * self.length
         self.mean_volume = float(targets.mean())
+        self.shares = targets / self.mean_volume
         self.rule = lobatto(order)
         self.timings = {"assemble": 0.0, "solve": 0.0, "pattern": 0.0, "t1": 0.0, "total": 0.0}
         self._pattern: Pattern | None = None
@@ -130,6 +131,7 @@ class Linearised:
         if len(network.markers):
             self._hold_markers()
         volumes = bubble_volumes(system.cell, network, state.points, state.offsets)
+        self.volumes = volumes / system.mean_volume
         self.volume_fault = (volumes - system.targets) / system.mean_volume
         relative = np.abs(volumes - system.targets) / system.targets
         self.residuals = self._residuals(float(relative.max()))

@@ -253,7 +253,7 @@ def _centres(cell: HeleShawCell, mesh: TriangleMesh, labels: Ints, points: Float
 
 def _advice(cell: HeleShawCell, count: int, n_nodes: int) -> str:
     # a bubble must not reach a third of the way round the tightest curve: 2π / k_max
-    _, sharpest = cell.surface.curvature_range()
+    sharpest = max(abs(k) for k in cell.surface.curvature_range())
     least = int(np.ceil(cell.surface.area * (3.0 * sharpest / (2.0 * np.pi)) ** 2))
     if count < least:
         return f"Use about {least} bubbles or more (now {count})"
