@@ -506,13 +506,12 @@ def test_the_larger_pull_wins():
 
 
 def test_dissociating_a_fourfold_vertex_the_right_way_lowers_the_energy():
-    """A short film between far bubbles: after the T1 the five films are shorter iff the pull is larger."""
-    thick = FOAMS["torus"]
-    # in a thin gap the energy is the length, whatever the direction
+    """A short film: after its T1 the five films are shorter by half the gain in pull."""
+    thick = FOAMS["sphere"]  # where straight films are geodesics, as the pull takes them to be
     cell = HeleShawCell(thick.cell.surface, 1e-4)
     foam = Foam(cell, thick.network, thick.vertex_points, np.zeros_like(thick.film_offsets))
     surface, net = cell.surface, foam.network
-    short = 0.004 * foam.bubble_size
+    short = 4e-4 * foam.bubble_size
     films = may_turn(net)[::3]
     agreed = 0
     for film in films:
@@ -530,7 +529,7 @@ def test_dissociating_a_fourfold_vertex_the_right_way_lowers_the_energy():
             agreed += 1
             change = turned.film_areas.sum() - before.film_areas.sum()
             # dE/dlength = 1 − |pull| / 2 for each
-            assert change == pytest.approx(-0.5 * gain * short * foam.cell.gap, rel=0.15)
+            assert change == pytest.approx(-0.5 * gain * short * foam.cell.gap, rel=0.05)
     assert agreed > 5
 
 

@@ -37,6 +37,8 @@ EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
 LEAST_SHIFT, MOST_SHIFT = 1e-10, 0.03
 #: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
 SADDLE, KICK = 1e-6, 0.05
+SLIPPED = "stopped: the volumes no longer add up, a film has slipped round the surface; use more bubbles"
+DEGENERATE = "stopped: a force became infinite or undefined, a film has degenerated"
 
 
 @dataclass
@@ -52,6 +54,7 @@ class _Run:
     iteration: int = 0
     events: list[T1Event] = field(default_factory=list)
     is_minimum: bool = False
+    fault: str = ""
 
 
 def relax(
@@ -164,7 +167,9 @@ def _iterate(
             # the mean digit count of the vertices' residuals grows almost evenly with time
             progress("relax", float(-np.log10(np.clip(now.vertex, 1e-5, 1.0)).mean()) / 5.0)
         done = now.force <= tolerance and now.volume_error <= max(0.01 * tolerance, 1e-12)
-        if not np.isfinite(now.force):
+        slipped = abs(float(now.volume.sum())) > 1e-6
+        if slipped or not np.isfinite(now.force):
+            run.fault = SLIPPED if slipped else DEGENERATE
             return now, False
         if done or run.iteration >= limit:
             condensed = lin.condensed(positive=False)
@@ -280,8 +285,8 @@ def _moved(run: _Run, step: Step) -> State:
 def _message(converged: bool, residuals: Residuals, run: _Run, tolerance: float, limit: int) -> str:
     if converged:
         return f"converged in {run.iteration} steps with {len(run.events)} T1s"
-    if not np.isfinite(residuals.force):
-        return "stopped: a force became infinite or undefined; a film has degenerated"
+    if run.fault:
+        return run.fault
     if residuals.force <= tolerance:
         return "stopped at a stationary foam that is no minimum"
     return (

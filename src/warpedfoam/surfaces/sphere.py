@@ -231,7 +231,8 @@ class Sphere:
         centre = np.where(norm > 1e-300, normal / np.where(norm > 1e-300, norm, 1.0), [0.0, 0.0, 1.0])
         sizes = loops.sizes
         c = np.repeat(centre, sizes, axis=0)
-        volume = np.einsum("hi,hi->h", c, np.cross(start, end))
+        # from differences: the triple product of three near points would lose its digits
+        volume = np.einsum("hi,hi->h", c, np.cross(start - c, end - c))
         dots = np.einsum("hi,hi->h", start, end) + np.einsum("hi,hi->h", c, start + end)
         solid = 2.0 * np.arctan2(volume, 1.0 + dots) + np.where(back, lune[film], -lune[film])
         return self._factor(layer) * np.add.reduceat(solid, loops.starts)

@@ -291,7 +291,9 @@ class Torus:
         alpha, beta = self._one_form(layer)
         nodes = self._nodes(tail, head, offsets)
         f = alpha * nodes.phi + beta * np.sin(nodes.phi)
-        along = nodes.rule.weights @ (f * nodes.dtheta)
+        # each arc's one-form is measured from its tail, each loop's from its first point: the large
+        # exact parts cancel round a loop, and would leave their round-off
+        along = nodes.rule.weights @ ((f - f[0]) * nodes.dtheta)
         dtheta = nodes.turned[4]
         film, back = loops.halves >> 1, (loops.halves & 1).astype(bool)
         sign = np.where(back, -1.0, 1.0)
@@ -299,10 +301,12 @@ class Torus:
         start, end = np.where(back, last, first), np.where(back, first, last)
         jump = np.zeros(len(film))
         jump[1:] = np.round((end[:-1] - start[1:]) / TURN)
-        total = np.cumsum(jump)
+        turns = np.cumsum(jump)
         sizes = loops.sizes
-        turns = total - np.repeat(total[loops.starts], sizes)
-        terms = sign * (along[film] + TURN * alpha * turns * dtheta[film])
+        turns -= np.repeat(turns[loops.starts], sizes)
+        here = f[0][film] + TURN * alpha * turns
+        here -= np.repeat(here[loops.starts], sizes)
+        terms = sign * (along[film] + here * dtheta[film])
         out: Floats = -np.add.reduceat(terms, loops.starts)
         return out
 

@@ -18,7 +18,7 @@ from warpedfoam.tessellate.regions import RegionNetwork, corner_weights, region_
 from warpedfoam.tessellate.seeds import blue_noise_seeds, check_seeds, lattice_seeds, random_seeds
 
 #: Mesh nodes per bubble, the fewest nodes of a mesh, and how often it is refined if too coarse.
-NODES_PER_BUBBLE, LEAST_NODES, REFINEMENTS = 40, 4000, 2
+NODES_PER_BUBBLE, LEAST_NODES, REFINEMENTS = 24, 4000, 2
 SEED_KINDS = ("random", "blue", "lattice")
 
 
@@ -56,7 +56,7 @@ def voronoi_foam(
         Target volumes: equal (default), an array that adds up to the cell's volume, or the width of
         a log-normal distribution (standard deviation of ln V).
     n_nodes : int, optional
-        Nodes of the mesh that carries the distances; by default 40 per bubble (at least 4000),
+        Nodes of the mesh that carries the distances; by default 24 per bubble (at least 4000),
         refined by itself where that is too coarse.
     order : int, optional
         Polynomial order p of the films.
@@ -257,4 +257,7 @@ def _advice(cell: HeleShawCell, count: int, n_nodes: int) -> str:
     least = int(np.ceil(cell.surface.area * (3.0 * sharpest / (2.0 * np.pi)) ** 2))
     if count < least:
         return f"Use about {least} bubbles or more (now {count})"
-    return f"Use n_nodes = {4 * n_nodes} or more (tried {n_nodes}), or seeds that are more even"
+    return (
+        f"Use more bubbles, seeds that are more even (seeds='blue'), or n_nodes = {4 * n_nodes} or more "
+        f"(tried {n_nodes})"
+    )
