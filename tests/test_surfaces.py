@@ -695,7 +695,6 @@ def test_plates_fold_at_the_hole(ring, tube):
             HeleShawCell(Torus(ring, tube), gap)
 
 
-@pytest.mark.xfail(reason="1 + gap * k is above 0 by a rounding error, as with 49 · (1/49)", strict=True)
 def test_plates_that_just_touch_are_refused():
     for limit in range(1, 200):
         with pytest.raises(ValueError, match="folds"):

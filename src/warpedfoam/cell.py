@@ -52,7 +52,8 @@ class HeleShawCell:
             raise TypeError("gap must be a number: gaps that vary with position are not available yet")
         gap = as_number(self.gap, "gap", positive=True)
         least, _ = self.surface.curvature_range()
-        if 1.0 + gap * least <= 0.0:
+        # plates that touch to round-off have folded: 1 + 49 · (−1/49) need not be 0
+        if 1.0 + gap * least <= 1e-12:
             raise ValueError(
                 f"gap {gap:g} folds the outer plate: it must be less than {-1.0 / least:g}, "
                 "the least radius of curvature on the side of the gap"
