@@ -536,6 +536,22 @@ def test_film_hessians_are_symmetric(surface):
     np.testing.assert_allclose(terms.hessian, flipped, atol=1e-12 * np.abs(terms.hessian).max())
 
 
+@pytest.mark.parametrize("chunk", [1, 7, 90, 10_000])
+@pytest.mark.parametrize("pressed", [False, True])
+def test_films_taken_in_parts_are_the_same_films(chunk, pressed, monkeypatch):
+    foam = foam_on(Torus(3.0, 1.2))
+    pressures = np.arange(foam.n_bubbles) / 7.0 if pressed else None
+    args = (foam.cell, foam.network, foam.vertex_points, foam.film_offsets)
+    whole = film_terms(*args, tension=0.7, pressures=pressures)
+    monkeypatch.setattr("warpedfoam.energy.film_area.CHUNK", chunk)
+    parts = film_terms(*args, tension=0.7, pressures=pressures)
+    for name in ("measure", "gradient", "volume", "hessian"):
+        one, other = getattr(whole, name), getattr(parts, name)
+        assert (one is None) == (other is None) == (name == "hessian" and not pressed)
+        if one is not None:
+            np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-13 * np.abs(one).max())
+
+
 @each_surface
 def test_volume_derivatives_cancel_round_the_surface(surface):
     """Every bubble's volume may change, their sum not: Σ over the two sides of each film is nothing."""

@@ -333,11 +333,11 @@ def test_meshes_are_refined_until_they_carry_the_bubbles(attempts, monkeypatch, 
         assert voronoi_foam(CELLS["sphere"], 30).network.charges.sum() == 12
         assert attempts == [first, 2 * first, 4 * first][: failures + 1]
     else:
-        with pytest.raises(ResolutionError, match=rf"too coarse. Use n_nodes = {16 * first} or more \(tried"):
+        with pytest.raises(ResolutionError, match=rf"too coarse.*n_nodes = {16 * first} or more \(tried"):
             voronoi_foam(CELLS["sphere"], 30)
         assert attempts == [first, 2 * first, 4 * first]
     attempts.clear()
-    with pytest.raises(ResolutionError, match="too coarse. Use n_nodes = 4000 or more"):
+    with pytest.raises(ResolutionError, match=r"too coarse.*n_nodes = 4000 or more"):
         voronoi_foam(CELLS["sphere"], 30, n_nodes=1000)  # of your choice: not refined
     assert attempts == [1000]
 
