@@ -280,6 +280,7 @@ def test_lattice_points_are_even(surface, n):
         mesh = surface.triangulate(20_000)
         exact = (mesh.node_areas @ mesh.nodes**2) / mesh.area
         np.testing.assert_allclose((points**2).mean(axis=0), exact, atol=0.01 * surface.size**2)
+        np.testing.assert_allclose(points.mean(axis=0), 0.0, atol=0.01 * surface.size)
 
 
 @pytest.mark.parametrize(("n", "message"), [(0, "at least 1"), (2.0, "integer"), (True, "integer")])
