@@ -240,7 +240,7 @@ table(
     "order of new films",
     lambda v: wf.voronoi_foam(cell(), 20, order=v),
     [
-        (0, ValueError, "order must be at least 1"),
+        (0, ValueError, "order must be at least 2"),
         (1.5, TypeError, "order must be an integer"),
         (25, ValueError, "order must be at most 24"),
     ],
@@ -256,7 +256,7 @@ table(
         (lambda: changed(np.ones(20), 4, -1.0), ValueError, "volumes must be above 0, but bubble 4 has -1"),
         (lambda: changed(np.ones(20), 4, 0.0), ValueError, "volumes must be above 0, but bubble 4 has 0"),
         (-0.1, ValueError, "volumes must be at least 0"),
-        (2.5, ValueError, "volumes as a log-normal width must be at most 2"),
+        (2.5, ValueError, "volumes as a log-normal width must be at most 1"),
         (np.nan, ValueError, "volumes must be finite"),
         ("equal", TypeError, "volumes must be a number"),
         (True, TypeError, "volumes must be a number"),
@@ -430,8 +430,8 @@ table(
     "with_order",
     lambda v: foam().with_order(v),
     [
-        (0, ValueError, "order must be at least 1"),
-        (41, ValueError, "order must be at most 40"),
+        (0, ValueError, "order must be at least 2"),
+        (41, ValueError, "order must be at most 24"),
         (4.0, TypeError, "order must be an integer"),
     ],
 )
@@ -445,7 +445,7 @@ table(
         ([(0, 1, 3), (3, 1, 0)], wf.TopologyError, "vertex 2 has 0 films"),
     ],
 )
-bad("loops round the wrong way", ValueError, "target_volumes must add up")(
+bad("loops round the wrong way", ValueError, "counter-clockwise")(
     lambda: wf.Foam.from_loops(
         cell(),
         [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]],
@@ -681,17 +681,15 @@ def test_one_interpreter_survives_them_all_and_works_on(tmp_path: Path) -> None:
     assert done.stdout.split() == [str(len(BAD)), str(len(BAD)), "True"]
 
 
-# ---------------------------------------------------------------------------- not refused as they should be
+# ---------------------------------------------------------------------------- found by attack, mended
 
 
-@pytest.mark.xfail(reason="sizes whose powers overflow or vanish fail in some array operation", strict=True)
 @pytest.mark.parametrize("radius", [1e-200, 1e200])
 def test_sizes_beyond_floating_point_are_refused_by_name(radius):
     with pytest.raises(ValueError, match="radius"):
         wf.voronoi_foam(wf.HeleShawCell(wf.Sphere(radius), gap=0.1 * radius), 20, seeds="lattice")
 
 
-@pytest.mark.xfail(reason="no upper limit: the rules of high orders run out of memory", strict=True)
 @pytest.mark.parametrize(
     "call",
     [
@@ -705,7 +703,6 @@ def test_enormous_orders_are_refused(call):
         call()
 
 
-@pytest.mark.xfail(reason="only the targets are added up, not the volumes that are", strict=True)
 def test_bubbles_inside_out_are_refused_with_targets_too():
     corners, loops = (
         [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]],
@@ -715,7 +712,6 @@ def test_bubbles_inside_out_are_refused_with_targets_too():
         wf.Foam.from_loops(cell(), corners, loops, target_volumes=np.full(4, cell().volume / 4))
 
 
-@pytest.mark.xfail(reason="only the targets are added up, not the volumes that are", strict=True)
 def test_a_surface_covered_twice_is_refused():
     torus = wf.HeleShawCell(wf.Torus(3.0, 1.0), 0.1)
     one = wf.voronoi_foam(torus, 60, seeds="lattice", n_nodes=2000)
@@ -730,7 +726,6 @@ def test_a_surface_covered_twice_is_refused():
         wf.Foam(torus, network, places, target_volumes=np.full(120, torus.volume / 120))
 
 
-@pytest.mark.xfail(reason="NumPy warns of a division by 0 before the message says it", strict=True)
 @pytest.mark.parametrize("surface", [wf.Sphere(1.0), wf.Torus(3.0, 1.0)], ids=["sphere", "torus"])
 def test_a_film_without_length_is_reported_without_warnings(surface):
     start = wf.voronoi_foam(wf.HeleShawCell(surface, 0.1), 60, seeds="lattice", n_nodes=2000)

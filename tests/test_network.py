@@ -280,7 +280,6 @@ except (TopologyError, ValueError) as fault:
 """
 
 
-@pytest.mark.xfail(reason="numbers are counted with arrays as long as the largest: no memory", strict=True)
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the memory of a process")
 @pytest.mark.parametrize(
     "call",
@@ -330,7 +329,6 @@ def test_networks_keep_their_own_arrays():
     assert net.bubble.tolist() == LENS["bubble"]
 
 
-@pytest.mark.xfail(reason="a read-only view of a writable array is kept, not copied", strict=True)
 def test_networks_do_not_share_memory_with_writable_arrays():
     owned = np.array(LENS["origin"])
     view = owned.view()

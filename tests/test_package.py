@@ -39,9 +39,7 @@ def test_command_answers_without_loading_the_machinery() -> None:
 
 def test_every_module_has_its_layer() -> None:
     contracts = {c["id"]: c for c in PROJECT["tool"]["importlinter"]["contracts"]}
-    layers = [
-        {name.strip(" ()") for name in layer.split("|")} for layer in contracts["layers"]["layers"]
-    ]
+    layers = [{name.strip(" ()") for name in layer.split("|")} for layer in contracts["layers"]["layers"]]
     source = ROOT / "src" / "warpedfoam"
     present = {p.stem for p in source.glob("*.py") if p.stem != "__init__"}
     present |= {p.parent.name for p in source.glob("*/__init__.py")}

@@ -232,6 +232,15 @@ def test_triangulations(surface, n_nodes):
     assert surface.triangulate(n_nodes) is mesh  # kept
 
 
+@pytest.mark.parametrize("n_nodes", [42, 400, 5000])
+def test_spheres_are_triangulated_evenly(n_nodes):
+    """The icosahedron's faces divided evenly in angle: edges within 1.2 of each other."""
+    mesh = Sphere(1.0).triangulate(n_nodes)
+    assert mesh.edge_lengths.max() < 1.2 * mesh.edge_lengths.min()
+    assert corner_angles(mesh).min() > 53.5
+    assert mesh.node_areas.max() < 1.5 * mesh.node_areas.min()  # five triangles at twelve nodes
+
+
 @each_surface
 def test_default_mesh_has_about_ten_thousand_nodes(surface):
     assert abs(surface.mesh.n_nodes / 10_000 - 1) < 0.05

@@ -219,12 +219,12 @@ def test_the_seed_decides_everything(name):
     np.testing.assert_array_equal(first.network.next, again.network.next)
     assert not np.array_equal(first.vertex_points[:50], foam_of(name, "random", 60, 1).vertex_points[:50])
     assert first.seed == 0
-    state = np.random.get_state()[1].copy()  # noqa: NPY002 - the global state must not move
+    words, place = np.random.get_state()[1:3]  # noqa: NPY002 - the global state must not move
     voronoi_foam(CELLS[name], 60, volumes=0.2)
-    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
+    np.testing.assert_array_equal(np.random.get_state()[1], words)  # noqa: NPY002
+    assert np.random.get_state()[2] == place  # noqa: NPY002
 
 
-@pytest.mark.xfail(reason="only a Python int is kept", strict=True)
 def test_an_integer_of_numpy_is_kept_as_the_seed():
     assert voronoi_foam(CELLS["sphere"], 20, seed=np.int64(7)).seed == 7
 
@@ -246,7 +246,7 @@ def test_lloyd_makes_bubbles_even(name):
     assert spread[-1] < 0.2
 
 
-@pytest.mark.parametrize("order", [1, 2, 7, 24])
+@pytest.mark.parametrize("order", [2, 3, 7, 24])
 def test_order_of_the_films(order):
     foam = voronoi_foam(CELLS["sphere"], 30, seeds="lattice", order=order)
     assert foam.film_offsets.shape == (foam.network.n_films, order - 1)
@@ -394,7 +394,6 @@ def test_bubbles_on_a_fat_torus_are_sound_or_refused(n, seed):
         assert (foam.bubble_areas > 0).all()
 
 
-@pytest.mark.xfail(reason="a film of more than half a turn gets through: areas do not add up", strict=True)
 @pytest.mark.parametrize(("n", "kind", "seed"), [(12, "blue", 2), (14, "random", 2), (30, "random", 2)])
 def test_films_of_more_than_half_a_turn_are_refused(n, kind, seed):
     cell = HeleShawCell(Torus(3.0, 1.2), 0.1)
@@ -408,7 +407,6 @@ def test_a_narrow_hole_asks_for_more_bubbles():
         voronoi_foam(HeleShawCell(Torus(1.05, 1.0), 0.01), 60, seeds="blue", n_nodes=4000)
 
 
-@pytest.mark.xfail(reason="the heat method gives up before the bubbles are counted", strict=True)
 def test_a_thin_ring_asks_for_more_bubbles():
     with pytest.raises(ResolutionError, match=r"Use about \d+ bubbles or more"):
         voronoi_foam(HeleShawCell(Torus(1000.0, 1.0), 0.1), 200)

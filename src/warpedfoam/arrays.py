@@ -19,7 +19,7 @@ Bools = NDArray[np.bool_]
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
     """Return ``array`` as a contiguous read-only array that shares no memory with a writable one."""
-    if not array.flags.writeable and array.flags.c_contiguous:
+    if not array.flags.writeable and array.flags.c_contiguous and array.base is None:
         return array
     out: NDArray[Any] = np.array(array, order="C", copy=True)
     out.flags.writeable = False
@@ -32,6 +32,7 @@ def as_number(
     *,
     positive: bool = False,
     minimum: float | None = None,
+    maximum: float | None = None,
 ) -> float:
     """Return a finite float; ``positive`` refuses zero and below.
 
@@ -48,13 +49,18 @@ def as_number(
         if value.ndim or value.dtype.kind not in "fiu":
             raise TypeError(f"{name} must be a single number, got an array of shape {value.shape}")
         value = value.item()
-    number = float(value)  # type: ignore[arg-type]
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got an integer too large for a float") from None
     if not np.isfinite(number):
         raise ValueError(f"{name} must be finite, got {number}")
     if positive and number <= 0.0:
         raise ValueError(f"{name} must be greater than 0, got {number:g}")
     if minimum is not None and number < minimum:
         raise ValueError(f"{name} must be at least {minimum:g}, got {number:g}")
+    if maximum is not None and number > maximum:
+        raise ValueError(f"{name} must be at most {maximum:g}, got {number:g}")
     return number
 
 

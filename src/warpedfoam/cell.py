@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from warpedfoam.arrays import as_integer, as_number
-from warpedfoam.surfaces.protocol import Layer, Surface
+from warpedfoam.surfaces.protocol import SIZES, Layer, Surface
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class HeleShawCell:
         d > 0. The plates must not fold: 1 + t k > 0 for every principal curvature k and 0 ≤ t ≤ d.
     n_heights : int, optional
         Gauss points through the gap for ruled film areas (2: exact on spheres, relative error
-        of order (d k)⁴/4000 elsewhere).
+        of order (d k)⁴/4000 elsewhere, for d k well below 1).
 
     Raises
     ------
@@ -50,7 +50,7 @@ class HeleShawCell:
             )
         if callable(self.gap):
             raise TypeError("gap must be a number: gaps that vary with position are not available yet")
-        gap = as_number(self.gap, "gap", positive=True)
+        gap = as_number(self.gap, "gap", positive=True, maximum=SIZES["maximum"])
         least, _ = self.surface.curvature_range()
         # plates that touch to round-off have folded: 1 + 49 · (−1/49) need not be 0
         if 1.0 + gap * least <= 1e-12:
@@ -59,7 +59,7 @@ class HeleShawCell:
                 "the least radius of curvature on the side of the gap"
             )
         object.__setattr__(self, "gap", gap)
-        object.__setattr__(self, "n_heights", as_integer(self.n_heights, "n_heights", minimum=1))
+        object.__setattr__(self, "n_heights", as_integer(self.n_heights, "n_heights", minimum=1, maximum=64))
 
     @cached_property
     def layer(self) -> Layer:

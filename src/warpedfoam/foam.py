@@ -13,12 +13,16 @@ from numpy.typing import ArrayLike
 from warpedfoam.arrays import Floats, Ints, as_floats, as_indices, as_integer, as_number, as_points, frozen
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import TopologyError
-from warpedfoam.kernels.quadrature import gauss
+from warpedfoam.kernels.quadrature import gauss, lobatto
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.surfaces.protocol import Layer
 
 if TYPE_CHECKING:
     import networkx as nx
+
+
+#: Highest polynomial order of films.
+MAX_ORDER = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +113,22 @@ class Foam:
         if film_offsets is None:
             film_offsets = np.zeros((network.n_films, 3))
         offsets = as_floats(film_offsets, "film_offsets", (network.n_films, None))
+        if offsets.shape[1] >= MAX_ORDER:
+            raise ValueError(f"film_offsets must be of order {MAX_ORDER} at most, got {offsets.shape[1] + 1}")
         put(self, "film_offsets", frozen(offsets))
         if target_volumes is None:
             targets = self.bubble_volumes
         else:
             targets = as_floats(target_volumes, "target_volumes", (network.n_bubbles,))
+        total = float(self.bubble_volumes.sum())
+        # the loops of an exterior that is no disk do not tell its volume
+        disks = bool((network.bubble_euler == 1).all())
+        if disks and not abs(total - cell.volume) <= 1e-6 * cell.volume:
+            raise ValueError(
+                f"the bubbles' volumes add up to {total:.9g}, not to the cell's {cell.volume:.9g}: "
+                "the loops must run counter-clockwise seen from outside and cover the surface once, "
+                "and no film may span half a turn"
+            )
         if (targets <= 0.0).any():
             bad = int(np.argmin(targets))
             raise ValueError(f"target_volumes must be above 0, but bubble {bad} has {targets[bad]:g}")
@@ -156,9 +171,11 @@ class Foam:
         >>> round(float(foam.film_lengths.sum()), 8)
         11.46379942
         """
+        if not isinstance(cell, HeleShawCell):
+            raise TypeError(f"cell must be a HeleShawCell, got {type(cell).__name__}")
         network = network_from_loops(loops)
         points = cell.surface.project(as_points(vertex_points, "vertex_points"))
-        n = as_integer(order, "order", minimum=1) - 1
+        n = as_integer(order, "order", minimum=2, maximum=MAX_ORDER) - 1
         return cls(cell, network, points, np.zeros((network.n_films, n)), target_volumes)
 
     @property
@@ -245,9 +262,7 @@ class Foam:
 
     def with_order(self, order: int) -> Foam:
         """The same foam with films of another order, their shapes interpolated."""
-        from warpedfoam.kernels.quadrature import lobatto
-
-        p = as_integer(order, "order", minimum=1, maximum=40)
+        p = as_integer(order, "order", minimum=2, maximum=MAX_ORDER)
         if p == self.order:
             return self
         old, new = lobatto(self.order), lobatto(p)
@@ -277,8 +292,14 @@ class Foam:
         return frozen(self.cell.surface.arc_measure(tail, head, self.film_offsets, layer))
 
     def _inside(self, layer: Layer) -> Floats:
-        tail, head = self.film_ends
-        loops = self.network.loops
-        parts = self.cell.surface.loop_integrals(tail, head, self.film_offsets, loops, layer)
-        owner = self.network.bubble[loops.halves[loops.starts]]
-        return frozen(np.bincount(owner, parts, minlength=self.n_bubbles))
+        return frozen(bubble_integrals(self.cell, self.network, self.vertex_points, self.film_offsets, layer))
+
+
+def bubble_integrals(
+    cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats, layer: Layer
+) -> Floats:
+    """∫ (c0 + c1 H + c2 G) dA over each bubble of a foam that is not yet a `Foam`, (n_bubbles,)."""
+    loops = network.loops
+    parts = cell.surface.loop_integrals(points[network.tails], points[network.heads], offsets, loops, layer)
+    owner = network.bubble[loops.halves[loops.starts]]
+    return np.bincount(owner, parts, network.n_bubbles).astype(np.float64, copy=False)

@@ -311,6 +311,8 @@ def _override(values: dict[str, Any], origins: dict[str, str], text: str) -> Non
     except tomllib.TOMLDecodeError:
         parsed = value
     section, _, leaf = name.rpartition(".")
+    if "." in section:
+        raise ValueError(f"--set {text}: there is no option {name}; write it as section.name=value")
     if section and section not in values:
         origins[section] = f"--set {text}"
     inner = values.setdefault(section, {}) if section else values

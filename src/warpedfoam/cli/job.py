@@ -131,6 +131,14 @@ def _folder(name: str) -> Path:
     return folder
 
 
+def _tidy(folder: Path) -> None:
+    """Remove the temporary files of a run that was killed outright while writing, ten minutes ago or more."""
+    for name in ("foam.ply", "foam_view.ply", "bubbles.csv", "films.csv", "foam.npz", "foam.png", RECORD):
+        for part in folder.glob(f".{name}.*.part"):
+            if time.time() - part.stat().st_mtime > 600.0:
+                part.unlink(missing_ok=True)
+
+
 def _write_outputs(
     folder: Path, relaxed: Relaxation, options: Options, progress: Progress
 ) -> dict[str, Path]:
@@ -138,8 +146,7 @@ def _write_outputs(
 
     foam = relaxed.foam
     (folder / RECORD).unlink(missing_ok=True)
-    for part in folder.glob(".*.part"):  # of a run that was killed outright while writing
-        part.unlink(missing_ok=True)
+    _tidy(folder)
     progress("write", 0.0)
     color_by = options.output.color_by
     ply, view = write_ply(folder / "foam.ply", foam, color_by=color_by)

@@ -6,6 +6,7 @@ import numpy as np
 
 from warpedfoam.arrays import Floats
 from warpedfoam.cell import HeleShawCell
+from warpedfoam.foam import bubble_integrals
 from warpedfoam.network import CellNetwork
 from warpedfoam.surfaces.protocol import ArcTerms
 
@@ -54,8 +55,4 @@ def film_terms(
 
 def bubble_volumes(cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats) -> Floats:
     """Steiner volumes of all bubbles, (n_bubbles,): the function whose derivative `film_terms` gives."""
-    loops = network.loops
-    tail, head = points[network.tails], points[network.heads]
-    parts = cell.surface.loop_integrals(tail, head, offsets, loops, cell.layer)
-    owner = network.bubble[loops.halves[loops.starts]]
-    return np.bincount(owner, parts, network.n_bubbles).astype(np.float64, copy=False)
+    return bubble_integrals(cell, network, points, offsets, cell.layer)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpedfoam.arrays import Bools, Floats
+from warpedfoam.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,7 +15,7 @@ class Condensed:
 
     ``matrix`` (k, k, F) and ``rhs`` (k, F) belong to the kept unknowns. ``rows`` (n, k + n, F),
     ``pivots`` (n, F) and ``heads`` (n, F) hold the eliminated equations, in their original order.
-    ``negative`` (F,) tells which systems had a pivot at or below zero before it was mended.
+    ``negative`` (F,) counts the pivots at or below zero, before they were mended.
     """
 
     matrix: Floats
@@ -23,7 +23,7 @@ class Condensed:
     rows: Floats
     pivots: Floats
     heads: Floats
-    negative: Bools
+    negative: Ints
 
     def recover(self, kept: Floats) -> Floats:
         """The eliminated unknowns (n, F) from the kept ones (k, F)."""
@@ -60,12 +60,12 @@ def condense(matrix: Floats, rhs: Floats, n_kept: int, floor: Floats | None) -> 
     n = m - n_kept
     rows = np.empty((n, m, count))
     pivots, heads = np.empty((n, count)), np.empty((n, count))
-    negative = np.zeros(count, dtype=np.bool_)
+    negative = np.zeros(count, dtype=np.int64)
     for i in range(n - 1, -1, -1):
         j = n_kept + i
         row = matrix[j, :j]
         pivot = matrix[j, j]
-        negative |= pivot <= 0.0
+        negative += pivot <= 0.0
         if floor is not None:
             pivot = np.maximum(np.abs(pivot), floor[i])
         rows[i, :j], pivots[i], heads[i] = row, pivot, rhs[j]

@@ -12,21 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpedfoam.arrays import Floats
-from warpedfoam.kernels.quadrature import LobattoRule
+from warpedfoam.arrays import Floats, Ints
+from warpedfoam.kernels.quadrature import LobattoRule, lobatto
 
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """Derivatives of a density g(x, v, v') at the nodes: K nodes, F arcs, m numbers x.
+    """Second derivatives of a density g(x, v, v') at the nodes: K nodes, F arcs, m numbers x.
 
-    ``x``: (m, K, F); ``v``, ``w`` (for v'): (K, F); ``xx``: (m, m, K, F); ``xv``, ``xw``: (m, K, F);
-    ``vv``, ``vw``, ``ww``: (K, F).
+    ``xx``: (m, m, K, F); ``xv``, ``xw`` (w for v'): (m, K, F); ``vv``, ``vw``, ``ww``: (K, F).
     """
 
-    x: Floats
-    v: Floats
-    w: Floats
     xx: Floats
     xv: Floats
     xw: Floats
@@ -55,7 +51,7 @@ def nodal_gradient(rule: LobattoRule, x: Floats, v: Floats, w: Floats) -> Floats
 
 def nodal_hessian(rule: LobattoRule, g: Density) -> Floats:
     """Hessian of Σ w_k g_k with respect to (x, u): (m + p − 1, m + p − 1, F)."""
-    m, n, count = len(g.x), rule.order - 1, g.v.shape[1]
+    m, n, count = len(g.xx), rule.order - 1, g.vv.shape[1]
     out = np.empty((m + n, m + n, count))
     weights, inner = rule.weights, rule.weights[1:-1]
     out[:m, :m] = np.einsum("k,ijkf->ijf", weights, g.xx)
@@ -73,3 +69,14 @@ def nodal_hessian(rule: LobattoRule, g: Density) -> Floats:
     block[diagonal, diagonal] += inner[:, None] * g.vv[1:-1]
     out[m:, m:] = block
     return out
+
+
+def bump_offsets(arc: Ints, xi: Floats, lift: Floats, n_arcs: int, order: int) -> Floats:
+    """Offsets (n_arcs, p − 1) of s · 4ξ(1 − ξ), s fitted to points (ξ, lift) of arcs and kept in ±0.5."""
+    bump = 4.0 * xi * (1.0 - xi)
+    bump = np.where((xi > 0.0) & (xi < 1.0), bump, 0.0)
+    above = np.bincount(arc, bump * lift, minlength=n_arcs)
+    below = np.bincount(arc, bump * bump, minlength=n_arcs)
+    height = np.clip(above / (below + 0.1), -0.5, 0.5)
+    nodes = lobatto(order).nodes[1:-1]
+    return height[:, None] * (4.0 * nodes * (1.0 - nodes))

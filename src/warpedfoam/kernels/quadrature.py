@@ -42,10 +42,9 @@ class LobattoRule:
         bary = 1.0 / gaps.prod(axis=1)
         diff = np.asarray(xi)[:, None] - self.nodes[None, :]
         hit = np.abs(diff) < 1e-14
-        parts = bary / np.where(hit, 1.0, diff)
+        rows = np.any(hit, axis=1, keepdims=True)
+        parts = np.where(rows, hit, bary / np.where(hit, 1.0, diff))
         out: Floats = parts / parts.sum(axis=1, keepdims=True)
-        rows = hit.any(axis=1)
-        out[rows] = hit[rows]
         return out
 
 

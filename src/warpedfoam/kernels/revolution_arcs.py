@@ -152,11 +152,7 @@ def pulled_hessian(arcs: TubeArcs, first: Floats, second: Floats, jacobian: Floa
         full += outer
         if i != j:
             full += outer.transpose(1, 0, 2, 3)
-    zero = np.zeros((3, *arcs.v.shape))
     density = Density(
-        x=zero,
-        v=arcs.v,
-        w=arcs.w,
         xx=full[:3, :3],
         xv=full[:3, 3],
         xw=full[:3, 4],

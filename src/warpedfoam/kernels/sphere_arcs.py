@@ -54,11 +54,7 @@ def arc_hessian(
     t = tension
     s1 = t * b + pressure * cos  # first and second β-derivative of T h + P sin
     s2 = t * bb - pressure * sin
-    zero = np.zeros((1, *v.shape))
     density = Density(
-        x=zero,
-        v=v,
-        w=w,
         xx=(2.0 * v * s1 + length * v * v * s2)[None, None],
         xv=(2.0 * length * s1 + length * beta * s2)[None],
         xw=(t * (hw + beta * bw))[None],
@@ -75,7 +71,7 @@ def geodesic_frame(tail: Floats, head: Floats) -> tuple[Floats, Floats, Floats, 
     sine = np.linalg.norm(cross, axis=1)
     cosine = np.einsum("fi,fi->f", tail, head)
     length = np.arctan2(sine, cosine)
-    left = cross / sine[:, None]
+    left = cross / np.maximum(sine, 1e-300)[:, None]
     return length, left, np.cross(left, tail), np.cross(left, head)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpedfoam.arrays import Bools, Floats, Ints, as_indices
+from warpedfoam.arrays import Bools, Floats, Ints, as_indices, as_number
 from warpedfoam.errors import TopologyError
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.quadrature import lobatto
@@ -163,7 +163,7 @@ def pulls(tangents: Floats) -> tuple[Floats, Floats]:
     """Pull of the four neighbours on the film's tail against its head: now, and after a T1.
 
     ``tangents`` (k, 4, 3) in the order of `T1Sites.outer`. If the film is short, its energy falls at
-    the rate |pull| − 1 per length as it grows along the pull, so the larger pull wins.
+    the rate |pull|/2 − 1 per length as it grows along the pull, so the larger pull wins.
     """
     a0, b1, a1, b0 = (tangents[:, i] for i in range(4))
     return a0 + b1 - a1 - b0, a0 + a1 - b0 - b1
@@ -188,7 +188,7 @@ def t1(foam: Foam, film: int, *, length: float | None = None) -> Foam:
     film : int
         The film that turns.
     length : float, optional
-        Length of the new film; a tenth of the bubble size by default.
+        Length of the new film, at most the bubble size; a tenth of that by default.
 
     Returns
     -------
@@ -200,12 +200,16 @@ def t1(foam: Foam, film: int, *, length: float | None = None) -> Foam:
     ValueError, TopologyError
         If there is no such film, or it may not turn (see `rewire`).
     """
+    if not isinstance(foam, Foam):
+        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
     chosen = as_indices([film], "film", (1,), below=foam.network.n_films)
     sites = t1_sites(foam.network, chosen)
     network = rewire(foam.network, chosen)
     surface = foam.cell.surface
     tangents = outward_tangents(surface, foam.network, foam.vertex_points, foam.film_offsets, sites.outer)
-    span = 0.1 * foam.bubble_size if length is None else length
+    span = 0.1 * foam.bubble_size
+    if length is not None:
+        span = as_number(length, "length", positive=True, maximum=foam.bubble_size)
     points, offsets = lay_films(
         surface,
         foam.network,

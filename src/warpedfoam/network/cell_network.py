@@ -64,6 +64,14 @@ class CellNetwork:
         object.__setattr__(self, "next", frozen(following))
         object.__setattr__(self, "origin", frozen(as_indices(origin, "origin", (count,))))
         object.__setattr__(self, "bubble", frozen(as_indices(bubble, "bubble", (count,))))
+        if count and self.next.max() >= count:
+            raise TopologyError("next must be a permutation of the half-films")
+        for name in ("origin", "bubble"):
+            if getattr(self, name).max(initial=0) > count:
+                raise TopologyError(
+                    f"{name} must number from 0 without gaps, got {int(getattr(self, name).max())} "
+                    f"with {count} half-films"
+                )
         if bubble_euler is None:
             euler = np.ones(int(self.bubble.max(initial=-1)) + 1, dtype=np.int64)
         else:

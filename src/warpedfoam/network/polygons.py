@@ -41,7 +41,7 @@ def network_from_loops(loops: Sequence[Sequence[int]]) -> CellNetwork:
         bad = next(i for i, ring in enumerate(rings) if len(ring) < 2)
         raise TopologyError(f"loops[{bad}] needs at least 2 vertices, got {len(rings[bad])}")
     sizes = np.array([len(ring) for ring in rings])
-    start = np.concatenate(rings)
+    start = as_indices(np.concatenate(rings), "loops", (None,), below=int(sizes.sum()))
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     position = np.arange(len(start))
     last = position == np.repeat(first + sizes - 1, sizes)

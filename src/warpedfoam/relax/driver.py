@@ -9,11 +9,11 @@ from types import MappingProxyType
 import numpy as np
 
 from warpedfoam.arrays import as_flag, as_integer, as_number, frozen
-from warpedfoam.foam import Foam
+from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.kernels.condense import Condensed
 from warpedfoam.moves.t1 import T1Event
 from warpedfoam.relax.kkt import KKT
-from warpedfoam.relax.linear import factoriser
+from warpedfoam.relax.linear import SingularMatrixError, factoriser
 from warpedfoam.relax.result import Relaxation
 from warpedfoam.relax.sweep import plan_sweep, realigned, turned
 from warpedfoam.relax.system import (
@@ -33,11 +33,17 @@ SOFTNESS, VOLUME_STEP = 0.02, 0.15
 VERTEX_CAP, OFFSET_CAP = 0.3, 0.2
 #: Exact Newton starts below the first residual, is left above the second, steps no farther than the third.
 EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
+#: Volumes below this share of the mean are held as if they had it.
+LEAST_SHARE = 0.1
 #: Shifts of the exact steps, in γ d / ℓ.
 LEAST_SHIFT, MOST_SHIFT = 1e-10, 0.03
 #: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
 SADDLE, KICK = 1e-6, 0.05
-SLIPPED = "stopped: the volumes no longer add up, a film has slipped round the surface; use more bubbles"
+SLIPPED = (
+    "stopped: the volumes no longer add up, so a film has slipped round the surface or a bubble has turned "
+    "inside out; use more bubbles, volumes that differ less, or more marker vertices"
+)
+SINGULAR = "stopped: the Newton matrix is singular"
 DEGENERATE = "stopped: a force became infinite or undefined, a film has degenerated"
 
 
@@ -73,7 +79,7 @@ def relax(
     steps are a proximal method of multipliers with local shifts; close to it Newton's method on the
     KKT system, with exact second derivatives and the film offsets eliminated film by film. Films
     that are about to vanish turn (T1) between steps if the pull of their neighbours favours it.
-    Time grows as about N^1.2; one step costs little more than its sparse factorisation.
+    One step costs two to five times its sparse factor-and-solve.
 
     Parameters
     ----------
@@ -84,7 +90,8 @@ def relax(
         Whether films may turn. Without T1s a film that wants to vanish keeps the foam from
         converging, which is reported.
     tolerance : float, optional
-        Of the residual, in γ d; at least 1e-13. Volumes are held to a hundredth of it, relative.
+        Of the residual, in γ d, 1e-13 … 1e-3. Volumes are held to a hundredth of it or to 1e-12,
+        whichever is larger, relative (bubbles below a tenth of the mean: relative to that).
     max_iterations : int, optional
     solver : {"auto", "superlu", "pardiso"}, optional
         Sparse solver; ``"auto"`` takes pardiso from 2000 bubbles if the package pypardiso is installed.
@@ -112,9 +119,11 @@ def relax(
     if not isinstance(foam, Foam):
         raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
     with_t1 = as_flag(t1, "t1")
-    tol = as_number(tolerance, "tolerance", minimum=1e-13)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    tol = as_number(tolerance, "tolerance", minimum=1e-13, maximum=1e-3)
     limit = as_integer(max_iterations, "max_iterations", minimum=0)
-    p = foam.order if order is None else as_integer(order, "order", minimum=2, maximum=24)
+    p = as_integer(foam.order if order is None else order, "order", minimum=2, maximum=MAX_ORDER)
     method = factoriser(solver, foam.n_bubbles)
     start = foam.with_order(p)
     system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles)
@@ -160,17 +169,22 @@ def _iterate(
     run: _Run, tolerance: float, limit: int, progress: Callable[[str, float], None] | None
 ) -> tuple[Residuals, bool]:
     exact = False
+    sound = run.state
     while True:
         lin = run.system.linearise(run.state)
         now = lin.residuals
         if progress is not None:
             # the mean digit count of the vertices' residuals grows almost evenly with time
             progress("relax", float(-np.log10(np.clip(now.vertex, 1e-5, 1.0)).mean()) / 5.0)
-        done = now.force <= tolerance and now.volume_error <= max(0.01 * tolerance, 1e-12)
-        slipped = abs(float(now.volume.sum())) > 1e-6
+        # the volumes of tiny bubbles cannot be held to twelve digits: a tenth of the mean counts instead
+        held = float((np.abs(now.volume) / np.maximum(run.system.shares, LEAST_SHARE)).max())
+        done = now.force <= tolerance and held <= max(0.01 * tolerance, 1e-12)
+        slipped = abs(float(now.volume.sum())) > 1e-6 * run.foam.n_bubbles
         if slipped or not np.isfinite(now.force):
             run.fault = SLIPPED if slipped else DEGENERATE
+            run.state = sound
             return now, False
+        sound = run.state
         if done or run.iteration >= limit:
             condensed = lin.condensed(positive=False)
             run.is_minimum = _is_minimum(lin, _kkt(run, lin, condensed, LEAST_SHIFT), condensed)
@@ -181,10 +195,14 @@ def _iterate(
             exact = now.force < EXACT_BELOW and error < EXACT_BELOW
         elif now.force > EXACT_ABOVE:
             exact = False
-        if exact:
-            _exact_step(run, lin)
-        else:
-            _proximal_step(run, lin)
+        try:
+            if exact:
+                _exact_step(run, lin)
+            else:
+                _proximal_step(run, lin)
+        except SingularMatrixError:
+            run.fault = SINGULAR
+            return now, False
         run.iteration += 1
 
 
@@ -267,8 +285,13 @@ def _kkt(run: _Run, lin: Linearised, condensed: Condensed, shift: float) -> KKT:
 
 
 def _is_minimum(lin: Linearised, kkt: KKT, condensed: Condensed) -> bool:
-    """Whether the matrix has the inertia of a minimum: one negative eigenvalue for each volume."""
-    return kkt.n_negative == lin.state.network.n_bubbles and not condensed.negative.any()
+    """Whether the whole matrix has the inertia of a minimum: one negative eigenvalue for each volume.
+
+    By Haynsworth's formula the eliminated offsets' pivots count too.
+    """
+    if kkt.n_negative < 0:
+        return False
+    return kkt.n_negative + int(condensed.negative.sum()) == lin.state.network.n_bubbles
 
 
 def _moved(run: _Run, step: Step) -> State:
@@ -287,7 +310,7 @@ def _message(converged: bool, residuals: Residuals, run: _Run, tolerance: float,
         return f"converged in {run.iteration} steps with {len(run.events)} T1s"
     if run.fault:
         return run.fault
-    if residuals.force <= tolerance:
+    if residuals.force <= tolerance and not run.is_minimum:
         return "stopped at a stationary foam that is no minimum"
     return (
         f"not converged after {run.iteration} of {limit} steps: residual {residuals.force:.2e} "

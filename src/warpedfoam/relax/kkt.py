@@ -61,6 +61,7 @@ class KKT:
         network, condensed = self._lin.state.network, self._condensed
         rhs = self._pattern.gather(condensed.rhs[_ROWS] * _SIGN[:, None])
         split = 2 * network.n_vertices
+        rhs[:split] = self._lin.without_rigid(rhs[:split])
         rhs[split:] += volume_fault
         solution = self._solve(rhs)
         clock = Stopwatch(self._timings)

@@ -20,6 +20,10 @@ SOLVERS = ("auto", "superlu", "pardiso")
 PARDISO_FROM = 2000
 
 
+class SingularMatrixError(ArithmeticError):
+    """A Newton matrix could not be factored."""
+
+
 class Factor(Protocol):
     """A factored symmetric matrix."""
 
@@ -45,14 +49,17 @@ class SuperLUFactor:
     """SciPy's SuperLU with diagonal pivots; the signs of U's diagonal give the inertia."""
 
     def __init__(self, matrix: csc_array) -> None:
-        self._lu = splu(
-            matrix,
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0,
-            relax=1,
-            panel_size=8,
-            options={"SymmetricMode": True, "Equil": False},
-        )
+        try:
+            self._lu = splu(
+                matrix,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                relax=1,
+                panel_size=8,
+                options={"SymmetricMode": True, "Equil": False},
+            )
+        except RuntimeError as fault:
+            raise SingularMatrixError(str(fault)) from None
 
     @property
     def n_negative(self) -> int:
@@ -91,5 +98,9 @@ def factoriser(solver: str, n_bubbles: int) -> Factoriser:
     if solver == "pardiso" or (solver == "auto" and present and n_bubbles >= PARDISO_FROM):
         from warpedfoam.relax.pardiso import Pardiso
 
-        return Pardiso()
+        try:
+            return Pardiso()
+        except (ImportError, OSError) as fault:
+            if solver == "pardiso":
+                raise ValueError(f"solver 'pardiso' cannot load its library: {fault}") from None
     return SuperLU()

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from pypardiso import PyPardisoSolver
+from pypardiso.pardiso_wrapper import PyPardisoError
 from scipy.sparse import csc_array, csr_matrix, tril
 
 from warpedfoam.arrays import Floats
+from warpedfoam.relax.linear import SingularMatrixError
 
 #: Real symmetric indefinite matrices.
 _SYMMETRIC = -2
@@ -17,7 +19,8 @@ class PardisoFactor:
 
     def __init__(self, solver: PyPardisoSolver, matrix: csr_matrix) -> None:
         self._solver, self._matrix = solver, matrix
-        self.n_negative = int(solver.iparm[22])
+        # a perturbed pivot has an arbitrary sign
+        self.n_negative = -1 if solver.iparm[13] else int(solver.iparm[22])
 
     def solve(self, rhs: Floats) -> Floats:
         """Solution for one right side."""
@@ -54,11 +57,14 @@ class Pardiso:
             solver.perm = np.arange(1, upper.shape[0] + 1, dtype=np.int32)
             solver.set_phase(12)
             self._pattern = pattern
-        solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+        try:
+            solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+        except PyPardisoError as fault:
+            raise SingularMatrixError(str(fault)) from None
         return PardisoFactor(solver, upper)
 
     def _release(self) -> None:
-        if self._pattern is not None:
+        if getattr(self, "_pattern", None) is not None:
             perm, self._solver.perm = self._solver.perm, np.zeros(0, dtype=np.int32)
             self._solver.free_memory(everything=True)
             self._solver.perm, self._pattern = perm, None

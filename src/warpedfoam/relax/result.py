@@ -29,13 +29,14 @@ class Relaxation:
     converged : bool
         Both below their tolerances, and the Hessian has the inertia of a minimum.
     is_minimum : bool
-        Whether the last Newton matrix had the inertia of a minimum.
+        Whether the Newton matrix at the last state has the inertia of a minimum; False too where a
+        fault ended the run before it was looked at.
     iterations : int
         Newton steps taken.
     events : tuple of T1Event
         Every T1 made, in order.
     timings : mapping of str to float
-        Seconds by kind of work: ``"assemble"``, ``"solve"``, ``"t1"``, ``"total"``.
+        Seconds by kind of work: ``"assemble"``, ``"solve"``, ``"pattern"``, ``"t1"``, ``"total"``.
     message : str
         Why it ended.
     """

@@ -110,6 +110,14 @@ class Linearised:
     def __init__(self, system: System, state: State) -> None:
         clock = Stopwatch(system.timings)
         self.system, self.state = system, state
+        self.rigid: Floats | None = None
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            # a film without length makes forces undefined: `Residuals.force` is then infinite
+            self._linearise()
+        clock.lap("assemble")
+
+    def _linearise(self) -> None:
+        system, state = self.system, self.state
         network = state.network
         terms = film_terms(
             system.cell,
@@ -135,17 +143,14 @@ class Linearised:
         self.volume_fault = (volumes - system.targets) / system.mean_volume
         relative = np.abs(volumes - system.targets) / system.targets
         self.residuals = self._residuals(float(relative.max()))
-        clock.lap("assemble")
-
-    @property
-    def energy(self) -> float:
-        """Σ film areas / (d ℓ)."""
-        return float(self.area.sum()) / self.system.film_unit
 
     def _hold_markers(self) -> None:
         """Let markers move across their film only: sliding along it would exploit the quadrature."""
         network = self.state.network
         along = marker_tangents(self.system.cell, self.state)
+        # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
+        modes = rigid_modes(self.system.cell, self.state)
+        self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None
         where = np.full(network.n_vertices, -1)
         where[network.markers] = np.arange(len(along))
         for row, ends in ((0, network.tails), (2, network.heads)):
@@ -167,7 +172,8 @@ class Linearised:
         ends = np.concatenate(
             [2 * network.tails, 2 * network.tails + 1, 2 * network.heads, 2 * network.heads + 1]
         )
-        net = np.bincount(ends, self.force[:4].ravel(), minlength=2 * count).reshape(count, 2)
+        summed = np.bincount(ends, self.force[:4].ravel(), 2 * count).astype(np.float64, copy=False)
+        net = self.without_rigid(summed).reshape(count, 2)
         at_vertex = np.linalg.norm(net, axis=1)
         if len(self.force) > 4:
             # an offset u moves its node by u times the film's length
@@ -176,9 +182,15 @@ class Linearised:
             np.maximum.at(at_vertex, network.tails, at_nodes)
             np.maximum.at(at_vertex, network.heads, at_nodes)
         force = float(at_vertex.max())
-        if not np.isfinite(force) or not np.isfinite(volume_error):
+        if not np.isfinite(self.hessian).all() or not np.isfinite(force) or not np.isfinite(volume_error):
             force = np.inf
         return Residuals(at_vertex, self.volume_fault, force, volume_error)
+
+    def without_rigid(self, forces: Floats) -> Floats:
+        """Vertex forces (2 n_vertices,) without their rigid part, where markers have been held."""
+        if self.rigid is None:
+            return forces
+        return forces - self.rigid @ (self.rigid.T @ forces)
 
     def condensed(self, *, positive: bool) -> Condensed:
         """Film blocks on (A₁, A₂, B₁, B₂, pressure jump), offsets eliminated.
@@ -232,20 +244,30 @@ def marker_tangents(cell: HeleShawCell, state: State) -> Floats:
     return out
 
 
-def pinned_unknowns(cell: HeleShawCell, state: State) -> Ints:
-    """Vertex unknowns (indices into (n_vertices, 2), flattened) that fix the rigid motions."""
-    from scipy.linalg import qr
-
+def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
+    """Rigid motions as vertex steps (k, 2 n_vertices), markers moving across their films only."""
     modes = cell.surface.rigid_motions(state.points)
-    if not len(modes):
-        return np.zeros(0, dtype=np.int64)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     markers = state.network.markers
     if len(markers):
         along = marker_tangents(cell, state)
         matrix[:, markers] -= np.einsum("kmi,mi,mj->kmj", matrix[:, markers], along, along)
-    _, triangle, pivots = qr(matrix.reshape(len(modes), -1), mode="economic", pivoting=True)
+    flat: Floats = matrix.reshape(len(modes), -1)
+    # a motion along the films alone has nothing left
+    size = np.linalg.norm(flat, axis=1)
+    kept: Floats = flat[size > 1e-6 * cell.surface.size]
+    return kept
+
+
+def pinned_unknowns(cell: HeleShawCell, state: State) -> Ints:
+    """Vertex unknowns (indices into (n_vertices, 2), flattened) that fix the rigid motions."""
+    from scipy.linalg import qr
+
+    modes = rigid_modes(cell, state)
+    if not len(modes):
+        return np.zeros(0, dtype=np.int64)
+    _, triangle, pivots = qr(modes, mode="economic", pivoting=True)
     size = np.abs(np.diagonal(triangle))
     rank = int((size > 1e-6 * size.max(initial=1e-300)).sum())
     return np.asarray(pivots[:rank], dtype=np.int64)

@@ -10,12 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Floats, Ints, frozen
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.quadrature import gauss
 from warpedfoam.surfaces.mesh import TriangleMesh
+
+#: Range of the lengths that describe a surface: beyond it their powers leave floating point.
+SIZES = {"minimum": 1e-60, "maximum": 1e60}
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +37,12 @@ class Layer:
     @classmethod
     def surface(cls) -> Layer:
         """Lengths and areas on the surface itself."""
-        return cls(frozen(gauss(1)[0] * 0.0), gauss(1)[1], (1.0, 0.0, 0.0))
+        return cls(frozen(np.zeros(1)), frozen(np.ones(1)), (1.0, 0.0, 0.0))
 
     @classmethod
     def curvature(cls) -> Layer:
         """Lengths on the surface, and ∫ G dA inside a loop."""
-        return cls(frozen(gauss(1)[0] * 0.0), gauss(1)[1], (0.0, 0.0, 1.0))
+        return cls(frozen(np.zeros(1)), frozen(np.ones(1)), (0.0, 0.0, 1.0))
 
     @classmethod
     def between_plates(cls, gap: float, n_heights: int = 2) -> Layer:
@@ -53,7 +57,9 @@ class ArcTerms:
 
     ``measure`` (F,) is the arc's measure, ``gradient`` (p + 3, F) its derivative, ``volume`` (p + 3, F)
     the derivative of the integral over the region left of the arc, and ``hessian`` (p + 3, p + 3, F),
-    if asked for, that of tension · measure − jump · (integral on the left).
+    if asked for, that of tension · measure − jump · (integral on the left). The volume derivatives leave
+    out what cancels round every closed loop of arcs, and the Hessian is symmetrised accordingly: both are
+    right when summed over closed loops, not arc by arc.
     """
 
     measure: Floats

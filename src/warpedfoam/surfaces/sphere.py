@@ -1,4 +1,4 @@
-"""The sphere: films in a frame of their own great circle, volumes exact by spherical triangles."""
+"""The sphere: films in a frame of their own great circle, volumes by spherical triangles and lunes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from warpedfoam.arrays import Floats, Ints, as_generator, as_integer, as_number, as_points, frozen
 from warpedfoam.kernels import sphere_arcs as arcs
 from warpedfoam.kernels.loops import Loops
-from warpedfoam.kernels.nodal import shape_values
+from warpedfoam.kernels.nodal import bump_offsets, shape_values
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.surfaces.icosphere import icosphere
 from warpedfoam.surfaces.mesh import TriangleMesh
-from warpedfoam.surfaces.protocol import ArcTerms, Layer
+from warpedfoam.surfaces.protocol import SIZES, ArcTerms, Layer
 
 GOLDEN = (1.0 + np.sqrt(5.0)) / 2.0
 
@@ -32,7 +32,7 @@ class Sphere:
     Raises
     ------
     TypeError, ValueError
-        If ``radius`` is not a finite number above 0.
+        If ``radius`` is not a finite number above 0 (1e-60 … 1e60, so that its powers are finite).
 
     Examples
     --------
@@ -46,7 +46,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", as_number(self.radius, "radius", positive=True))
+        object.__setattr__(self, "radius", as_number(self.radius, "radius", positive=True, **SIZES))
 
     @property
     def area(self) -> float:
@@ -219,34 +219,40 @@ class Sphere:
     def loop_integrals(
         self, tail: Floats, head: Floats, offsets: Floats, loops: Loops, layer: Layer
     ) -> Floats:
-        """Spherical triangles from each loop's vector area, plus the lunes: sums to 4π exactly."""
+        """Spherical triangles about each loop's middle, plus the lunes: a whole foam sums to 4π exactly."""
         a, b = tail / self.radius, head / self.radius
         length, _, _, _ = arcs.geodesic_frame(a, b)
         _, lune = arcs.arc_length_and_lune(lobatto(offsets.shape[1] + 1), length, offsets.T)
         film, back = loops.halves >> 1, (loops.halves & 1).astype(bool)
         start = np.where(back[:, None], b[film], a[film])
         end = np.where(back[:, None], a[film], b[film])
-        normal = np.add.reduceat(np.cross(start, end), loops.starts, axis=0)
-        norm = np.linalg.norm(normal, axis=1, keepdims=True)
-        centre = np.where(norm > 1e-300, normal / np.where(norm > 1e-300, norm, 1.0), [0.0, 0.0, 1.0])
-        sizes = loops.sizes
-        c = np.repeat(centre, sizes, axis=0)
+        c = np.repeat(_middles(start, end, length[film], loops), loops.sizes, axis=0)
         # from differences: the triple product of three near points would lose its digits
         volume = np.einsum("hi,hi->h", c, np.cross(start - c, end - c))
         dots = np.einsum("hi,hi->h", start, end) + np.einsum("hi,hi->h", c, start + end)
         solid = 2.0 * np.arctan2(volume, 1.0 + dots) + np.where(back, lune[film], -lune[film])
-        return self._factor(layer) * np.add.reduceat(solid, loops.starts)
+        inside: Floats = np.add.reduceat(solid, loops.starts)
+        if abs(inside.sum()) < 1.0:
+            # one region is larger than the rest together: its middle lies outside it
+            inside[np.argmin(inside)] += 4.0 * np.pi
+        return self._factor(layer) * inside
 
 
-def bump_offsets(arc: Ints, xi: Floats, lift: Floats, n_arcs: int, order: int) -> Floats:
-    """Offsets (n_arcs, p − 1) of s · 4ξ(1 − ξ), s fitted to points (ξ, lift) of arcs and kept in ±0.5."""
-    bump = 4.0 * xi * (1.0 - xi)
-    bump = np.where((xi > 0.0) & (xi < 1.0), bump, 0.0)
-    above = np.bincount(arc, bump * lift, minlength=n_arcs)
-    below = np.bincount(arc, bump * bump, minlength=n_arcs)
-    height = np.clip(above / (below + 0.1), -0.5, 0.5)
-    nodes = lobatto(order).nodes[1:-1]
-    return height[:, None] * (4.0 * nodes * (1.0 - nodes))
+def _middles(start: Floats, end: Floats, length: Floats, loops: Loops) -> Floats:
+    """A unit vector in the middle of each loop, (n_loops, 3).
+
+    The mean of the loop's points, whichever way it runs, so that a bubble turned inside out has a
+    negative area; for loops near a great circle, whose mean is no direction, the vector area.
+    """
+    weight = np.maximum(length, 1e-300)[:, None]
+    total = np.add.reduceat(weight, loops.starts, axis=0)
+    mean = np.add.reduceat(0.5 * weight * (start + end), loops.starts, axis=0) / total
+    normal = np.add.reduceat(np.cross(start, end), loops.starts, axis=0)
+    size = np.linalg.norm(mean, axis=1, keepdims=True)
+    chosen = np.where(size > 0.3, mean, normal)
+    norm = np.linalg.norm(chosen, axis=1, keepdims=True)
+    out: Floats = np.where(norm > 0.0, chosen / np.where(norm > 0.0, norm, 1.0), [0.0, 0.0, 1.0])
+    return out
 
 
 @lru_cache(maxsize=4)

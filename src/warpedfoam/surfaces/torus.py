@@ -12,12 +12,11 @@ from warpedfoam.arrays import Floats, Ints, as_generator, as_integer, as_number,
 from warpedfoam.kernels import revolution_arcs as arcs
 from warpedfoam.kernels.lattice import best_lattice
 from warpedfoam.kernels.loops import Loops
-from warpedfoam.kernels.nodal import shape_values
+from warpedfoam.kernels.nodal import bump_offsets, shape_values
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.surfaces.mesh import TriangleMesh
-from warpedfoam.surfaces.protocol import ArcTerms, Layer
+from warpedfoam.surfaces.protocol import SIZES, ArcTerms, Layer
 from warpedfoam.surfaces.rings import stitched_rings
-from warpedfoam.surfaces.sphere import bump_offsets
 
 TURN = 2.0 * np.pi
 
@@ -55,8 +54,8 @@ class Torus:
     minor_radius: float
 
     def __post_init__(self) -> None:
-        ring = as_number(self.major_radius, "major_radius", positive=True)
-        tube = as_number(self.minor_radius, "minor_radius", positive=True)
+        ring = as_number(self.major_radius, "major_radius", positive=True, **SIZES)
+        tube = as_number(self.minor_radius, "minor_radius", positive=True, **SIZES)
         if ring <= tube:
             raise ValueError(
                 "major_radius must exceed minor_radius (else the torus cuts itself), "
@@ -90,7 +89,7 @@ class Torus:
         return _torus_mesh(self, as_integer(n_nodes, "n_nodes", minimum=48))
 
     def angles(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """Tube angle φ and ring angle θ of each point, both in (−π, π].
+        """Tube angle φ and ring angle θ of each point, both in [−π, π].
 
         Raises
         ------
@@ -287,7 +286,7 @@ class Torus:
     def loop_integrals(
         self, tail: Floats, head: Floats, offsets: Floats, loops: Loops, layer: Layer
     ) -> Floats:
-        """−∮ (αφ + β sin φ) dθ with φ continued along each loop: exact for any loop of a disk."""
+        """−∮ (αφ + β sin φ) dθ with φ continued along each loop, for loops of disks."""
         alpha, beta = self._one_form(layer)
         nodes = self._nodes(tail, head, offsets)
         f = alpha * nodes.phi + beta * np.sin(nodes.phi)

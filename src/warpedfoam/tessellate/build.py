@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from warpedfoam.arrays import Floats, Ints, as_choice, as_floats, as_generator, as_integer, as_number
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ResolutionError
-from warpedfoam.foam import Foam
+from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.protocol import Layer
 from warpedfoam.tessellate.fields import SeedFields, seed_fields
 from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR, HeatGeodesics
 from warpedfoam.tessellate.regions import RegionNetwork, corner_weights, region_network, tidy_labels
@@ -19,6 +20,9 @@ from warpedfoam.tessellate.seeds import blue_noise_seeds, check_seeds, lattice_s
 
 #: Mesh nodes per bubble, the fewest nodes of a mesh, and how often it is refined if too coarse.
 NODES_PER_BUBBLE, LEAST_NODES, REFINEMENTS = 24, 4000, 2
+TOO_LONG = "a film would be too long for the surface: it spans half a turn or more"
+#: Beyond these memory ends before patience does.
+MOST_NODES, MOST_BUBBLES = 5_000_000, 200_000
 SEED_KINDS = ("random", "blue", "lattice")
 
 
@@ -88,8 +92,8 @@ def voronoi_foam(
     count = len(points)
     sweeps = as_integer(lloyd, "lloyd", minimum=0, maximum=1000)
     targets = _target_volumes(cell, count, volumes, rng)
-    p = as_integer(order, "order", minimum=1, maximum=24)
-    fixed = None if n_nodes is None else as_integer(n_nodes, "n_nodes", minimum=100)
+    p = as_integer(order, "order", minimum=2, maximum=MAX_ORDER)
+    fixed = None if n_nodes is None else as_integer(n_nodes, "n_nodes", minimum=100, maximum=MOST_NODES)
     if fixed is not None and fixed < 6 * count:
         raise ResolutionError(
             f"n_nodes = {fixed} is too coarse for {count} bubbles; use at least {6 * count}, "
@@ -100,12 +104,25 @@ def voronoi_foam(
             f"n_bubbles must be at least 4 on a closed surface without handles, got {count}; "
             "two hemispheres and three lunes can be built with Foam.from_loops"
         )
+    if 9 * count < _fitting(cell):
+        raise ResolutionError(
+            f"too few bubbles for the surface: {count} would not be disks but reach round its tightest "
+            "circle. "
+            f"{_advice(cell, count, 0)}"
+        )
     nodes = fixed or max(LEAST_NODES, NODES_PER_BUBBLE * count)
     attempts = 1 if fixed is not None else 1 + REFINEMENTS
     for attempt in range(attempts):
         try:
             return _built(
-                cell, points, targets, nodes, sweeps, p, seed if isinstance(seed, int) else None, progress
+                cell,
+                points,
+                targets,
+                nodes,
+                sweeps,
+                p,
+                None if isinstance(seed, np.random.Generator) else int(seed),
+                progress,
             )
         except ResolutionError as fault:
             if attempt == attempts - 1:
@@ -176,6 +193,9 @@ def _laid_out(
     chord = np.linalg.norm(head - tail, axis=1)
     short = chord < 0.3 * float(np.sqrt(surface.area / network.n_bubbles))
     offsets[short] = 0.0
+    covered = bubble_integrals(cell, network, vertices, offsets, Layer.surface()).sum()
+    if abs(covered - surface.area) > 1e-6 * surface.area:
+        raise ResolutionError(TOO_LONG)
     return Foam(cell, network, vertices, offsets, targets, seed=seed)
 
 
@@ -186,9 +206,7 @@ def _check_areas(foam: Foam, mesh: TriangleMesh, labels: Ints) -> None:
     per_node = mesh.area / mesh.n_nodes
     allowance = 0.5 * mean + 4.0 * np.sqrt(rough * per_node)
     if (np.abs(foam.bubble_areas - rough) > allowance).any():
-        raise ResolutionError(
-            "a film would be too long for the surface: it spans half a turn or more; use more bubbles"
-        )
+        raise ResolutionError(TOO_LONG)
 
 
 def _seed_points(
@@ -199,7 +217,7 @@ def _seed_points(
         kind = as_choice(seeds, "seeds", SEED_KINDS)
         if n_bubbles is None:
             raise TypeError("n_bubbles is needed unless seeds is an array of points")
-        count = as_integer(n_bubbles, "n_bubbles", minimum=1)
+        count = as_integer(n_bubbles, "n_bubbles", minimum=1, maximum=MOST_BUBBLES)
         if kind == "random":
             return random_seeds(surface, count, rng)
         if kind == "blue":
@@ -218,8 +236,8 @@ def _target_volumes(
         return np.full(count, cell.volume / count)
     if isinstance(volumes, (int, float, np.integer, np.floating)) or np.ndim(volumes) == 0:
         width = as_number(volumes, "volumes", minimum=0.0)
-        if width > 2.0:
-            raise ValueError(f"volumes as a log-normal width must be at most 2, got {width:g}")
+        if width > 1.0:
+            raise ValueError(f"volumes as a log-normal width must be at most 1, got {width:g}")
         drawn = np.exp(width * rng.standard_normal(count))
         shares: Floats = drawn / drawn.sum()
         return cell.volume * shares
@@ -251,10 +269,14 @@ def _centres(cell: HeleShawCell, mesh: TriangleMesh, labels: Ints, points: Float
     return cell.surface.project(np.where((total > 0.0)[:, None], mean, points))
 
 
-def _advice(cell: HeleShawCell, count: int, n_nodes: int) -> str:
-    # a bubble must not reach a third of the way round the tightest curve: 2π / k_max
+def _fitting(cell: HeleShawCell) -> int:
+    """Bubbles so small that three of them go round the tightest circle, of girth 2π / k_max."""
     sharpest = max(abs(k) for k in cell.surface.curvature_range())
-    least = int(np.ceil(cell.surface.area * (3.0 * sharpest / (2.0 * np.pi)) ** 2))
+    return int(np.ceil(cell.surface.area * (3.0 * sharpest / (2.0 * np.pi)) ** 2))
+
+
+def _advice(cell: HeleShawCell, count: int, n_nodes: int) -> str:
+    least = _fitting(cell)
     if count < least:
         return f"Use about {least} bubbles or more (now {count})"
     return (
