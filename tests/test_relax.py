@@ -271,3 +271,39 @@ def test_unknown_solver() -> None:
     """A solver that does not exist is a ValueError that lists those that do."""
     with pytest.raises(ValueError, match="superlu"):
         factoriser("mumps", 100)
+
+
+def test_inverted_bubble_has_negative_volume() -> None:
+    """A small bubble mirrored in place is inside out: its volume is negative, the sum stays exact.
+
+    Taken the other way round it would pass for the whole rest of the sphere (seed 5 of 5000 random
+    bubbles once stopped on this).
+    """
+    foam = wf.voronoi_foam(CELLS["sphere"], 200, seeds="lattice")
+    bubble = 57
+    loops = foam.network.loops
+    start = loops.starts[bubble]
+    corners = foam.network.origin[loops.halves[start : start + loops.sizes[bubble]]]
+    centre = foam.bubble_centres[bubble]
+    side = np.cross(centre, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side)
+    points = foam.vertex_points.copy()
+    points[corners] -= 2.0 * np.outer(points[corners] @ side, side)
+    mirrored = wf.Foam(foam.cell, foam.network, points, 0.0 * foam.film_offsets, foam.target_volumes)
+    assert mirrored.bubble_volumes[bubble] < -0.5 * foam.target_volumes[bubble]
+    assert mirrored.bubble_volumes.sum() == pytest.approx(foam.cell.volume, rel=1e-12)
+
+
+def test_one_tiny_bubble() -> None:
+    """A bubble of a hundredth of the mean volume relaxes with the others."""
+    volumes = np.ones(80)
+    volumes[0] = 0.01
+    cell = CELLS["sphere"]
+    result = wf.relax(wf.voronoi_foam(cell, 80, seeds="blue", volumes=volumes * cell.volume / volumes.sum()))
+    assert result.converged, result.message
+
+
+def test_tolerance_has_a_ceiling() -> None:
+    """A tolerance that would call anything converged is refused."""
+    with pytest.raises(ValueError, match="tolerance must be at most"):
+        wf.relax(wf.voronoi_foam(CELLS["sphere"], 20, seeds="lattice"), tolerance=1.0)
