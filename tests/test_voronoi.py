@@ -82,6 +82,20 @@ def test_the_network_is_the_exact_one_but_for_films_shorter_than_an_edge(kind, n
     assert (np.abs(foam.bubble_areas - areas) < 0.2 * h * perimeter).all()
 
 
+def test_films_lie_on_the_bisectors():
+    """Points of a film are as far from one seed as from the other, to a fraction of a mesh edge."""
+    seeds = SEEDS["blue"](SPHERE, 60)
+    for n_nodes in (4000, 16_000):
+        h = SPHERE.triangulate(n_nodes).mean_edge
+        foam = voronoi_foam(CELLS["sphere"], seeds=seeds, n_nodes=n_nodes)
+        across = seeds[foam.network.left] - seeds[foam.network.right]
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        long = foam.film_lengths > 3 * h
+        off = np.abs(np.einsum("fkx,fx->fk", foam.film_curves(9), across))[long, 2:-2] / h
+        assert off.mean() < 0.06
+        assert off.max() < 0.3
+
+
 def test_vertices_converge_with_the_mesh():
     """Halving the edge halves the error, which stays a tenth of an edge."""
     seeds = SEEDS["blue"](SPHERE, 60)
