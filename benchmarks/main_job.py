@@ -111,7 +111,7 @@ def main() -> int:
     parser.add_argument("--core", type=int, help="core to run on; the last by default")
     args = parser.parse_args()
     one_core(args.core)
-    wf.relax(wf.voronoi_foam(cell_of(args.surface), 100), solver=args.solver)
+    wf.relax(wf.voronoi_foam(cell_of(args.surface), 200, seeds="blue"), solver=args.solver)
 
     medians: dict[int, dict[str, float]] = {}
     good, nudge = True, 0
