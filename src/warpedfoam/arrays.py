@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+Kind = TypeVar("Kind")
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
@@ -24,6 +26,20 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     out: NDArray[Any] = np.array(array, order="C", copy=True)
     out.flags.writeable = False
     return out
+
+
+def as_instance(value: object, name: str, kind: type[Kind]) -> Kind:
+    """Return ``value`` if it is a ``kind``; anything else is a ``TypeError``.
+
+    Examples
+    --------
+    >>> as_instance(None, "foam", dict)
+    Traceback (most recent call last):
+    TypeError: foam must be a dict, got NoneType
+    """
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be a {kind.__name__}, got {type(value).__name__}")
+    return value
 
 
 def as_number(

@@ -233,7 +233,7 @@ def lay_films(
 ) -> tuple[Floats, Floats]:
     """Points and offsets with each site's film laid along ``along`` (k, 3), about its middle."""
     tail, head = network.origin[sites.a], network.origin[sites.c]
-    middle = 0.5 * (points[tail] + points[head])
+    middle = surface.project(0.5 * (points[tail] + points[head]))
     normal = surface.normals(middle)
     flat = along - np.einsum("ki,ki->k", along, normal)[:, None] * normal
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)

@@ -7,7 +7,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpedfoam.arrays import Floats, Ints, as_choice, as_floats, as_generator, as_integer, as_number
+from warpedfoam.arrays import (
+    Floats,
+    Ints,
+    as_choice,
+    as_floats,
+    as_generator,
+    as_instance,
+    as_integer,
+    as_number,
+)
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ResolutionError
 from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
@@ -15,7 +24,13 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.protocol import Layer
 from warpedfoam.tessellate.fields import SeedFields, seed_fields
 from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR, HeatGeodesics
-from warpedfoam.tessellate.regions import RegionNetwork, corner_weights, region_network, tidy_labels
+from warpedfoam.tessellate.regions import (
+    RegionNetwork,
+    corner_weights,
+    opened_rings,
+    region_network,
+    tidy_labels,
+)
 from warpedfoam.tessellate.seeds import blue_noise_seeds, check_seeds, lattice_seeds, random_seeds
 
 #: Mesh nodes per bubble, the fewest nodes of a mesh, and how often it is refined if too coarse.
@@ -85,8 +100,7 @@ def voronoi_foam(
     >>> int(foam.network.charges.sum())
     12
     """
-    if not isinstance(cell, HeleShawCell):
-        raise TypeError(f"cell must be a HeleShawCell, got {type(cell).__name__}")
+    as_instance(cell, "cell", HeleShawCell)
     rng = as_generator(seed)
     points = _seed_points(cell, n_bubbles, seeds, rng)
     count = len(points)
@@ -154,7 +168,10 @@ def _built(
     for sweep in range(sweeps):
         points = _centres(cell, mesh, fields(points, sweep).labels(), points)
     field = fields(points, sweeps)
-    labels = tidy_labels(mesh, field.labels(), _nearest_nodes(mesh, points))
+    labels, homes = field.labels(), _nearest_nodes(mesh, points)
+    for _ in range(3):
+        # an opened ring may cut off an island, an island given away may empty a region
+        labels = opened_rings(mesh, tidy_labels(mesh, labels, homes), points)
     regions = region_network(mesh, labels, count)
     foam = _laid_out(cell, field, labels, regions, targets, order, seed)
     _check_areas(foam, mesh, labels)
@@ -255,9 +272,10 @@ def _target_volumes(
 
 
 def _nearest_nodes(mesh: TriangleMesh, points: Floats) -> Ints:
+    """The four nodes nearest to each point, (n, 4)."""
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(mesh.nodes).query(points)[1], dtype=np.int64)
+    return np.asarray(cKDTree(mesh.nodes).query(points, k=4)[1], dtype=np.int64)
 
 
 def _centres(cell: HeleShawCell, mesh: TriangleMesh, labels: Ints, points: Floats) -> Floats:

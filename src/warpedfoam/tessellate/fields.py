@@ -49,7 +49,8 @@ def seed_fields(
 
     A solve measures from the mesh node next to each seed. Its value at that node is taken off (a
     solve for many sources leaves a different offset at each), and the seed's distance from the node
-    enters by the difference of the squared chords.
+    enters by the difference of the squared chords. Where another seed of the colour is nearer the
+    field tells of that one: no distance may be shorter than the chord by more than an edge.
 
     Parameters
     ----------
@@ -74,16 +75,18 @@ def seed_fields(
     bounds = np.searchsorted(colours[near.ravel()][order], np.arange(n_colours + 1))
     by_colour = np.argsort(colours, kind="stable")
     first = np.searchsorted(colours[by_colour], np.arange(n_colours + 1))
+    shift = nodes[:, None, :] - nodes[source[near]]
+    straight = np.einsum("nki,nki->nk", shift, shift)
+    least = (np.sqrt(straight) - heat.mesh.mean_edge).ravel()
     squares = np.empty(near.size)
     for colour in range(n_colours):
         members = by_colour[first[colour] : first[colour + 1]]
         field = heat.distances(source[members])
         take = order[bounds[colour] : bounds[colour + 1]]
         seed = near.ravel()[take]
-        distance = np.maximum(field[take // count] - field[source[seed]], 0.0)
+        distance = np.maximum(field[take // count] - field[source[seed]], np.maximum(least[take], 0.0))
         squares[take] = distance**2
         if progress is not None:
             progress((colour + 1) / n_colours)
-    shift = nodes[:, None, :] - nodes[source[near]]
-    squares = squares.reshape(near.shape) + chord**2 - np.einsum("nki,nki->nk", shift, shift)
+    squares = squares.reshape(near.shape) + chord**2 - straight
     return SeedFields(heat.mesh, near.astype(np.int64), squares)

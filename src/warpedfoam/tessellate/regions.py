@@ -29,24 +29,62 @@ class RegionNetwork:
 
 
 def tidy_labels(mesh: TriangleMesh, labels: Ints, homes: Ints) -> Ints:
-    """Give every region its home node, and every island of a region to the regions round it.
+    """Give every region a home node, and every island of a region to the regions round it.
 
-    ``homes`` (n_regions,) are the nodes nearest to the seeds; a region that owns no node takes its
-    home. Islands are the pieces of a region that do not hold its largest part.
+    ``homes`` (n_regions, k) are the nodes nearest to the seeds, nearest first; a region that owns no
+    node takes the first that is not another's last. Islands are the pieces of a region that do not
+    hold its largest part.
     """
     count = len(homes)
     owned = np.bincount(labels, minlength=count)
     missing = np.flatnonzero(owned == 0)
     if missing.size:
-        homes_free = owned[labels[homes[missing]]] > 1
         labels = labels.copy()
-        labels[homes[missing[homes_free]]] = missing[homes_free]
+    for region in missing:
+        free = homes[region][owned[labels[homes[region]]] > 1]
+        if free.size:
+            owned[labels[free[0]]] -= 1
+            labels[free[0]] = region
+            owned[region] = 1
     for _ in range(20):
         island = _islands(mesh, labels, count)
         if not island.any():
             break
         labels = _absorbed(mesh, labels, island)
     return labels
+
+
+def opened_rings(mesh: TriangleMesh, labels: Ints, seeds: Floats) -> Ints:
+    """Labels with no region shut in by a single other one, where two seeds nearly coincide.
+
+    The shut-in region gets the nodes of the one round it that lie farther on its side of the plane
+    between the two seeds than its own nodes do: so close by, a bisector is straight.
+    """
+    count = len(seeds)
+    rings = np.flatnonzero(_euler(mesh, labels, count) < 1)
+    if not rings.size:
+        return labels
+    labels = labels.copy()
+    a, b = labels[mesh.edges].T
+    pairs = np.unique(np.sort(np.stack([a, b], axis=1)[a != b], axis=1), axis=0)
+    degree = np.bincount(pairs.ravel(), minlength=count)
+    for ring in rings:
+        beside = pairs[(pairs == ring).any(axis=1)].sum(axis=1) - ring
+        for inner in beside[degree[beside] == 1]:
+            side = mesh.nodes @ (seeds[inner] - seeds[ring])
+            labels[(labels == ring) & (side >= side[labels == inner].min())] = inner
+    return labels
+
+
+def _euler(mesh: TriangleMesh, labels: Ints, count: int) -> Ints:
+    """Euler characteristic of each region: its nodes, the edges and the triangles inside it."""
+    nodes = np.bincount(labels, minlength=count)
+    a, b = labels[mesh.edges].T
+    edges = np.bincount(a[a == b], minlength=count)
+    x, y, z = labels[mesh.triangles].T
+    triangles = np.bincount(x[(x == y) & (y == z)], minlength=count)
+    out: Ints = nodes - edges + triangles
+    return out
 
 
 def _islands(mesh: TriangleMesh, labels: Ints, count: int) -> Bools:
@@ -142,11 +180,7 @@ def _require_disks(mesh: TriangleMesh, labels: Ints, count: int) -> None:
         raise ResolutionError(
             f"{int((nodes == 0).sum())} of {count} bubbles own no mesh node; use more nodes (n_nodes)"
         )
-    a, b = labels[mesh.edges].T
-    edges = np.bincount(a[a == b], minlength=count)
-    x, y, z = labels[mesh.triangles].T
-    triangles = np.bincount(x[(x == y) & (y == z)], minlength=count)
-    euler = nodes - edges + triangles
+    euler = _euler(mesh, labels, count)
     if _islands(mesh, labels, count).any() or (euler != 1).any():
         bad = int((euler != 1).sum())
         raise ResolutionError(
