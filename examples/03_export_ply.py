@@ -19,11 +19,15 @@ import warpedfoam as wf
 from warpedfoam.io import load, save, write_bubbles_csv, write_films_csv
 
 
-def main(folder: str | Path) -> float:
-    """Return the area of the triangles of ``foam_view.ply`` over the sphere's."""
+def main(folder: str | Path) -> tuple[float, float]:
+    """Return the area of the triangles of ``foam_view.ply`` over the sphere's, and the foam's energy."""
     folder = Path(folder)
     sphere = wf.Sphere(radius=1.0)
-    foam = wf.relax(wf.voronoi_foam(wf.HeleShawCell(sphere, gap=0.05), n_bubbles=72, seeds="lattice")).foam
+    cell = wf.HeleShawCell(sphere, gap=0.05)
+    relaxed = wf.relax(wf.voronoi_foam(cell, n_bubbles=72, seeds="lattice"))
+    if not relaxed.converged:
+        raise SystemExit(f"not converged: {relaxed.message}")
+    foam = relaxed.foam
 
     ply, view = wf.write_ply(folder / "foam.ply", foam, color_by="pressure")
     write_bubbles_csv(folder / "bubbles.csv", foam)
@@ -33,9 +37,9 @@ def main(folder: str | Path) -> float:
         raise SystemExit("the foam read back differs")
 
     mesh = trimesh.load(view, process=False)
-    print(f"{ply}: {foam.network.n_bubbles} bubbles, {foam.network.n_films} films")
+    print(f"{ply}: {foam.network.n_bubbles} bubbles, {foam.network.n_films} films, energy {foam.energy:.9f}")
     print(f"{view}: {len(mesh.faces)} triangles, {100.0 * mesh.area / sphere.area:.2f} % of the sphere")
-    return float(mesh.area / sphere.area)
+    return float(mesh.area / sphere.area), foam.energy
 
 
 if __name__ == "__main__":

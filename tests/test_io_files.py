@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import io
 import json
 import os
 import stat
 import zipfile
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -137,7 +139,24 @@ class TestRecord:
         assert not list(tmp_path.iterdir())
 
     def test_versions(self) -> None:
-        assert versions()["numpy"] == np.__version__
+        found = versions()
+        assert found["numpy"] == np.__version__
+        assert found["matplotlib"] == metadata.version("matplotlib")
+        present = importlib.util.find_spec("pypardiso") is not None
+        assert found.get("pypardiso") == (metadata.version("pypardiso") if present else None)
+
+    def test_optional_packages_are_listed_if_installed_only(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def version(name: str) -> str:
+            if name in absent:
+                raise metadata.PackageNotFoundError(name)
+            return "1.0"
+
+        monkeypatch.setattr(metadata, "version", version)
+        absent = {"pypardiso", "matplotlib"}
+        assert "pypardiso" not in versions()
+        assert versions()["matplotlib"] == "not installed"
+        absent = set()
+        assert versions()["pypardiso"] == "1.0"
 
 
 def _table(path: Path) -> dict[str, list[str]]:

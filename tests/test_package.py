@@ -61,6 +61,25 @@ def test_papers_agree_on_the_version() -> None:
     assert "MIT License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
 
 
+def test_developers_get_the_fast_solver_where_there_is_one() -> None:
+    from packaging.requirements import Requirement  # pytest needs it too
+
+    extras = PROJECT["project"]["optional-dependencies"]
+    (own,) = [r for text in extras["dev"] if (r := Requirement(text)).name == "warpedfoam"]
+    assert own.extras == {"fast", "test"}
+    (fast,) = map(Requirement, extras["fast"])
+    assert fast.name == "pypardiso"
+    assert fast.marker is not None
+    found = {
+        (machine, system)
+        for machine in ("x86_64", "AMD64", "aarch64", "arm64", "ARM64")
+        for system in ("linux", "darwin", "win32")
+        if fast.marker.evaluate({"platform_machine": machine, "sys_platform": system})
+    }
+    assert found == {("x86_64", "linux"), ("AMD64", "win32")}
+    assert 'install("[dev]")' in (ROOT / "run.py").read_text(encoding="utf-8")
+
+
 def test_readme_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     code = text.split("```python\n")[1].split("```")[0]

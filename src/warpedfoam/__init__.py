@@ -10,6 +10,9 @@ A foam one bubble thick sits between two parallel curved plates a small gap apar
 (True, 0)
 """
 
+from warpedfoam import startup  # first, before anything slow
+
+# isort: split
 from warpedfoam.analysis import (
     EquilibriumReport,
     SideDistribution,
@@ -38,13 +41,14 @@ from warpedfoam.moves import T1Event, t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import plot_foam, save_picture
 from warpedfoam.relax import Relaxation, relax
-from warpedfoam.surfaces import Sphere, Surface, Torus, TriangleMesh
+from warpedfoam.surfaces import Ellipsoid, Sphere, Surface, Torus, TriangleMesh
 from warpedfoam.tessellate import HeatGeodesics, geodesic_distances, voronoi_foam
 
 __version__ = "0.1.0"
 
 __all__ = [
     "CellNetwork",
+    "Ellipsoid",
     "ConvergenceError",
     "EquilibriumReport",
     "FileFormatError",

@@ -123,7 +123,7 @@ class Foam:
         total = float(self.bubble_volumes.sum())
         # the loops of an exterior that is no disk do not tell its volume
         disks = bool((network.bubble_euler == 1).all())
-        if disks and not abs(total - cell.volume) <= 1e-6 * cell.volume:
+        if disks and not abs(total - cell.volume) <= cell.surface.precision * cell.volume:
             raise ValueError(
                 f"the bubbles' volumes add up to {total:.9g}, not to the cell's {cell.volume:.9g}: "
                 "the loops must run counter-clockwise seen from outside and cover the surface once, "

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, frozen
+from warpedfoam.arrays import Floats, as_instance, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.quadrature import lobatto
 
@@ -74,8 +74,7 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
     >>> report.identity_error < 1e-5, report.angle_error < 1e-5
     (True, True)
     """
-    if not isinstance(foam, Foam):
-        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    as_instance(foam, "foam", Foam)
     surface, network = foam.cell.surface, foam.network
     rule = lobatto(foam.order + 8)
     curve = foam.film_curves_at(rule.nodes)

@@ -13,9 +13,11 @@ from typing import Annotated, Any
 
 import typer
 
+from warpedfoam.cli import CLOSED_PIPE
 from warpedfoam.cli.progress import progress_bars
+from warpedfoam.startup import INTERRUPTED, raise_on_interrupt
 
-NOT_CONVERGED, BAD_INPUT, FAULT, INTERRUPTED = 1, 2, 3, 130
+NOT_CONVERGED, BAD_INPUT, FAULT = 1, 2, 3
 
 app = typer.Typer(
     help="Bubbles and foams trapped between curved plates.",
@@ -190,9 +192,9 @@ def _run(options: Callable[[], Any], *, as_json: bool, quiet: bool, debug: bool)
         with progress_bars(quiet=quiet) as report:
             job = run_job(chosen, report)
         if as_json:
-            print(json.dumps(job.summary, allow_nan=False))
+            print(json.dumps(job.summary, allow_nan=False), flush=True)
         elif not quiet:
-            print(summary_text(job.record))
+            print(summary_text(job.record), flush=True)
     if not job.relaxation.converged:
         _say(f"did not converge: {job.relaxation.message}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)
@@ -214,7 +216,7 @@ def summary_text(record: Mapping[str, Any]) -> str:
             f"state     {state} after {record['iterations']} steps and {record['n_t1']} T1s, "
             f"residual {_number(record['residual'])}, volume error {_number(record['volume_error'])}",
             f"energy    {_number(record['energy'], 10)}, films {_number(record['length_over_honeycomb'], 5)} "
-            "times as long as the flat honeycomb's",
+            "times as long as the bound of the flat honeycomb",
             f"sides     {sides}   (charges add up to {record['sum_of_charges']} "
             f"= 6 x {record['euler_characteristic']})",
             f"time      {times['build']:.1f} s building, {times['relax']:.1f} s relaxing, "
@@ -238,6 +240,7 @@ def _ending_well(debug: bool) -> Iterator[None]:
     from warpedfoam.errors import ConvergenceError
 
     try:
+        raise_on_interrupt()
         yield
     except KeyboardInterrupt:
         _say("interrupted; no file was left half-written")
@@ -245,6 +248,9 @@ def _ending_well(debug: bool) -> Iterator[None]:
     except Stopped as stop:
         _say("stopped by a signal; no file was left half-written")
         raise typer.Exit(128 + stop.signum) from None
+    except BrokenPipeError:
+        # the files are written; that nobody reads the summary is no fault
+        raise typer.Exit(CLOSED_PIPE) from None
     except Exception as fault:
         bad = isinstance(fault, (ValueError, TypeError, OSError))
         if debug or not (bad or isinstance(fault, ConvergenceError)):

@@ -11,11 +11,13 @@ from typing import Any, TypeVar
 
 from warpedfoam.arrays import as_choice, as_flag, as_floats, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
+from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
+from warpedfoam.relax.linear import SOLVERS
 from warpedfoam.surfaces import Sphere, Surface, Torus
+from warpedfoam.tessellate.build import SEED_KINDS
 
 Section = TypeVar("Section")
-SEEDS = ("random", "blue", "lattice")
 DEFAULT_BUBBLES = 200
 
 #: Each kind of surface and the sizes that it has unless told otherwise.
@@ -39,7 +41,7 @@ def _above_zero(value: Any, name: str) -> float:
 
 
 def _order(value: Any, name: str) -> int:
-    return as_integer(value, name, minimum=2, maximum=24)
+    return as_integer(value, name, minimum=2, maximum=MAX_ORDER)
 
 
 def _tolerance(value: Any, name: str) -> float:
@@ -59,7 +61,7 @@ def _text(value: Any, name: str) -> str:
 def _seeds(value: Any, name: str) -> Any:
     if isinstance(value, list):
         return as_points(value, name).tolist()
-    return as_choice(value, name, SEEDS)
+    return as_choice(value, name, SEED_KINDS)
 
 
 def _volumes(value: Any, name: str) -> Any:
@@ -107,7 +109,7 @@ class RelaxOptions:
     t1: bool = field(default=True, metadata=read_by(as_flag))
     max_iterations: int = field(default=1000, metadata=read_by(_at_least(0)))
     tolerance: float = field(default=1e-10, metadata=read_by(_tolerance))
-    solver: str = field(default="auto", metadata=read_by(_one_of("auto", "superlu", "pardiso")))
+    solver: str = field(default="auto", metadata=read_by(_one_of(*SOLVERS)))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from warpedfoam.cli.progress import Progress, silent
 from warpedfoam.foam import Foam
 from warpedfoam.relax.result import Relaxation
 
-HONEYCOMB = 12.0**0.25  #: film length per bubble of unit area in the flat honeycomb
 RECORD = "record.json"
 
 
@@ -173,12 +172,12 @@ def _write_outputs(
 
 
 def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
-    from warpedfoam.analysis import equilibrium_report, side_distribution
+    from warpedfoam.analysis import equilibrium_report, honeycomb_bound, side_distribution
 
     foam = relaxed.foam
     network = foam.network
     found, report = side_distribution(foam), equilibrium_report(foam)
-    honeycomb = HONEYCOMB * float(np.sqrt(foam.bubble_areas).sum())
+    length = float(foam.film_lengths.sum())
     return {
         "converged": relaxed.converged,
         "is_minimum": relaxed.is_minimum,
@@ -188,8 +187,8 @@ def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
         "volume_error": relaxed.volume_error,
         "energy": relaxed.energy,
         "energy_start": start.energy,
-        "length": float(foam.film_lengths.sum()),
-        "length_over_honeycomb": float(foam.film_lengths.sum()) / honeycomb,
+        "length": length,
+        "length_over_honeycomb": length / honeycomb_bound(foam.bubble_areas),
         "n_bubbles": network.n_bubbles,
         "n_films": network.n_films,
         "n_vertices": network.n_vertices,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpedfoam.arrays import Bools, Floats, as_choice, frozen
+from warpedfoam.arrays import Bools, Floats, as_choice, as_instance, frozen
 from warpedfoam.foam import Foam
 
 Bytes = NDArray[np.uint8]
@@ -59,8 +59,7 @@ def bubble_colours(foam: Foam, color_by: str = "charge") -> BubbleColours:
     ValueError
         If ``color_by`` is unknown, or asks for pressures that the foam does not have.
     """
-    if not isinstance(foam, Foam):
-        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    as_instance(foam, "foam", Foam)
     name = as_choice(color_by, "color_by", COLOR_CHOICES)
     inside = foam.network.bubble_euler == 1
     if not inside.any():

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpedfoam.arrays import Bools, Floats, Ints, as_integer, as_number, frozen
+from warpedfoam.arrays import Bools, Floats, Ints, as_instance, as_integer, as_number, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.io.remainder import remainder
 from warpedfoam.network import CellNetwork
@@ -143,8 +143,7 @@ def bubble_patches(foam: Foam, *, curve_points: int = 9, rings: int = 4, rim_wid
     -----
     O(n_bubbles · sides · curve_points · rings), array operations only.
     """
-    if not isinstance(foam, Foam):
-        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    as_instance(foam, "foam", Foam)
     n_rings = as_integer(rings, "rings", minimum=1)
     width = as_number(rim_width, "rim_width", minimum=0.0) * foam.bubble_size
     along = film_points(foam, curve_points)

@@ -61,6 +61,21 @@ def write_ply(
         or ``curve_points`` is below 2.
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from warpedfoam import Foam, HeleShawCell, Sphere
+    >>> points = [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]]
+    >>> loops = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    >>> foam = Foam.from_loops(HeleShawCell(Sphere(1.0), gap=0.01), points, loops)
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> network, view = write_ply(pathlib.Path(folder.name) / "foam.ply", foam, color_by="area")
+    >>> network.name, view.name
+    ('foam.ply', 'foam_view.ply')
+    >>> [line for line in network.read_text().splitlines() if line.startswith("element")]
+    ['element vertex 46', 'element face 4', 'element edge 48']
+    >>> folder.cleanup()
     """
     target = writable_path(path, suffixes=(".ply",))
     view = writable_path(target.with_name(target.stem + "_view.ply"))

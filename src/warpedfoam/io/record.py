@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from warpedfoam.io.atomic import PathLike, as_path, atomic_text
+from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 
-_PACKAGES = ("warpedfoam", "numpy", "scipy", "libigl", "trimesh", "networkx")
+_PACKAGES = ("warpedfoam", "numpy", "scipy", "libigl", "trimesh", "networkx", "matplotlib")
+#: Listed where they are installed: another solver rounds differently.
+_OPTIONAL = ("pypardiso",)
 
 
 def write_record(path: PathLike, record: Mapping[str, Any]) -> Path:
@@ -53,29 +55,30 @@ def write_record(path: PathLike, record: Mapping[str, Any]) -> Path:
     }
     >>> folder.cleanup()
     """
+    target = writable_path(path)
     if not isinstance(record, Mapping):
         raise TypeError(f"record must be a mapping, got {type(record).__name__}")
     text = json.dumps(_plain(record, "record"), allow_nan=False, ensure_ascii=False, indent=2, sort_keys=True)
-    target = as_path(path)
     with atomic_text(target) as stream:
         stream.write(text + "\n")
     return target
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, warpedfoam and the packages its results depend on.
+    """Versions of Python, warpedfoam and the packages its results depend on, and of pypardiso if installed.
 
     Examples
     --------
-    >>> sorted(versions())
-    ['libigl', 'networkx', 'numpy', 'python', 'scipy', 'trimesh', 'warpedfoam']
+    >>> sorted(versions().keys() - {"pypardiso"})
+    ['libigl', 'matplotlib', 'networkx', 'numpy', 'python', 'scipy', 'trimesh', 'warpedfoam']
     """
     found = {"python": platform.python_version()}
-    for name in _PACKAGES:
+    for name in (*_PACKAGES, *_OPTIONAL):
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = "not installed"
+            if name not in _OPTIONAL:
+                found[name] = "not installed"
     return found
 
 

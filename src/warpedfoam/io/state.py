@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warpedfoam.surfaces as _surfaces
-from warpedfoam.arrays import as_indices
+from warpedfoam.arrays import as_indices, as_instance
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
-from warpedfoam.io.atomic import PathLike, as_path, atomic_binary
+from warpedfoam.io.atomic import PathLike, as_path, atomic_binary, writable_path
 from warpedfoam.network import CellNetwork
 
 FORMAT = "warpedfoam foam"
@@ -54,9 +54,22 @@ def save(path: PathLike, foam: Foam) -> Path:
         If ``foam`` is not a Foam, or its surface is not a dataclass of numbers and arrays.
     FileNotFoundError, IsADirectoryError, ValueError
         If the path cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from warpedfoam import Foam, HeleShawCell, Sphere
+    >>> points = [[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]]
+    >>> loops = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    >>> foam = Foam.from_loops(HeleShawCell(Sphere(1.0), gap=0.01), points, loops)
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = save(pathlib.Path(folder.name) / "foam.npz", foam)
+    >>> path.name, len(load(path).vertex_points)
+    ('foam.npz', 4)
+    >>> folder.cleanup()
     """
-    if not isinstance(foam, Foam):
-        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
+    target = writable_path(path)
+    as_instance(foam, "foam", Foam)
     network = foam.network
     arrays: Arrays = {
         "next": network.next,
@@ -82,7 +95,6 @@ def save(path: PathLike, foam: Foam) -> Path:
     }
     text = json.dumps(header, allow_nan=False, sort_keys=True)
     arrays["header"] = np.frombuffer(text.encode("utf-8"), dtype=np.uint8)
-    target = as_path(path)
     with atomic_binary(target) as stream:
         np.savez(stream, allow_pickle=False, **arrays)
     return target
@@ -96,6 +108,10 @@ def load(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
     path : str or path
     surfaces : iterable of classes, optional
         Surface classes of your own that the file may name, besides those of `warpedfoam.surfaces`.
+
+    Returns
+    -------
+    Foam
 
     Raises
     ------

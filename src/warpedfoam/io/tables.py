@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from warpedfoam.arrays import Floats
+from warpedfoam.arrays import Floats, as_instance
 from warpedfoam.foam import Foam
-from warpedfoam.io.atomic import PathLike, as_path, atomic_text
+from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 
 Columns = dict[str, list[Any]]
 
@@ -39,7 +39,8 @@ def write_bubbles_csv(path: PathLike, foam: Foam) -> Path:
     FileNotFoundError, IsADirectoryError, ValueError
         If the path cannot be written.
     """
-    network = _checked(foam).network
+    target = writable_path(path)
+    network = as_instance(foam, "foam", Foam).network
     x, y, z = foam.bubble_centres.T
     columns: Columns = {
         "id": foam.bubble_ids.tolist(),
@@ -54,7 +55,7 @@ def write_bubbles_csv(path: PathLike, foam: Foam) -> Path:
         "energy_share": _energy_shares(foam).tolist(),
         "gaussian_curvature": (foam.bubble_curvatures / foam.bubble_areas).tolist(),
     }
-    return _write(path, columns)
+    return _write(target, columns)
 
 
 def write_films_csv(path: PathLike, foam: Foam) -> Path:
@@ -81,7 +82,8 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
     FileNotFoundError, IsADirectoryError, ValueError
         If the path cannot be written.
     """
-    network = _checked(foam).network
+    target = writable_path(path)
+    network = as_instance(foam, "foam", Foam).network
     x, y, z = foam.film_curves_at(np.array([0.5]))[:, 0].T
     jump = None if foam.pressures is None else foam.pressures[network.left] - foam.pressures[network.right]
     columns: Columns = {
@@ -97,7 +99,7 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
         "y": y.tolist(),
         "z": z.tolist(),
     }
-    return _write(path, columns)
+    return _write(target, columns)
 
 
 def _energy_shares(foam: Foam) -> Floats:
@@ -110,14 +112,7 @@ def _or_blank(values: Floats | None, count: int) -> list[Any]:
     return [""] * count if values is None else values.tolist()
 
 
-def _checked(foam: object) -> Foam:
-    if not isinstance(foam, Foam):
-        raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
-    return foam
-
-
-def _write(path: PathLike, columns: Columns) -> Path:
-    target = as_path(path)
+def _write(target: Path, columns: Columns) -> Path:
     with atomic_text(target) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)

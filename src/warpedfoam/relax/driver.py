@@ -179,7 +179,7 @@ def _iterate(
         # the volumes of tiny bubbles cannot be held to twelve digits: a tenth of the mean counts instead
         held = float((np.abs(now.volume) / np.maximum(run.system.shares, LEAST_SHARE)).max())
         done = now.force <= tolerance and held <= max(0.01 * tolerance, 1e-12)
-        slipped = lin.slip > 1e-6
+        slipped = lin.slip > run.foam.cell.surface.precision
         if slipped or not np.isfinite(now.force):
             run.fault = SLIPPED if slipped else DEGENERATE
             run.state = sound

@@ -24,6 +24,9 @@ from warpedfoam.relax.pattern import Pattern
 #: Least stiffness of an offset in a proximal step, relative to a straight film of the same length.
 STIFFNESS_FLOOR = 0.5
 
+#: Surfaces more precise than this integrate exactly, so that their symmetries are exact too.
+INVARIANT = 1e-5
+
 
 class Stopwatch:
     """Adds the seconds since it was last read to a kind of work."""
@@ -82,6 +85,7 @@ class System:
         self.film_unit = float(cell.layer.shares.sum()) * self.length
         self.mean_volume = float(targets.mean())
         self.shares = targets / self.mean_volume
+        self.invariant = cell.surface.precision <= INVARIANT
         self.rule = lobatto(order)
         self.timings = {"assemble": 0.0, "solve": 0.0, "pattern": 0.0, "t1": 0.0, "total": 0.0}
         self._pattern: Pattern | None = None
@@ -138,6 +142,10 @@ class Linearised:
         self.force[:4] *= system.length
         if len(network.markers):
             self._hold_markers()
+        if len(network.markers) or not system.invariant:
+            # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
+            modes = rigid_modes(system.cell, state)
+            self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None
         volumes = bubble_volumes(system.cell, network, state.points, state.offsets)
         self.volumes = volumes / system.mean_volume
         # one constraint is redundant: what all volumes together are off by (round-off, if nothing has
@@ -152,9 +160,6 @@ class Linearised:
         """Let markers move across their film only: sliding along it would exploit the quadrature."""
         network = self.state.network
         along = marker_tangents(self.system.cell, self.state)
-        # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
-        modes = rigid_modes(self.system.cell, self.state)
-        self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None
         where = np.full(network.n_vertices, -1)
         where[network.markers] = np.arange(len(along))
         for row, ends in ((0, network.tails), (2, network.heads)):
@@ -191,7 +196,7 @@ class Linearised:
         return Residuals(at_vertex, self.volume_fault, force, volume_error)
 
     def without_rigid(self, forces: Floats) -> Floats:
-        """Vertex forces (2 n_vertices,) without their rigid part, where markers have been held."""
+        """Vertex forces (2 n_vertices,) without their rigid part, where that is no real force."""
         if self.rigid is None:
             return forces
         return forces - self.rigid @ (self.rigid.T @ forces)
@@ -257,7 +262,7 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     if len(markers):
         along = marker_tangents(cell, state)
         matrix[:, markers] -= np.einsum("kmi,mi,mj->kmj", matrix[:, markers], along, along)
-    flat: Floats = matrix.reshape(len(modes), -1)
+    flat: Floats = matrix.reshape(len(modes), 2 * state.network.n_vertices)
     # a motion along the films alone has nothing left
     size = np.linalg.norm(flat, axis=1)
     kept: Floats = flat[size > 1e-6 * cell.surface.size]

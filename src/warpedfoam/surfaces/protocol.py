@@ -92,6 +92,11 @@ class Surface(Protocol):
         """Radius of a ball round the origin that holds the surface; the scale of round-off."""
         ...
 
+    @property
+    def precision(self) -> float:
+        """Relative error that loop integrals may show on a sound foam: round-off, or that of quadrature."""
+        ...
+
     def triangulate(self, n_nodes: int) -> TriangleMesh:
         """A triangulation with about ``n_nodes`` nodes, all on the surface."""
         ...

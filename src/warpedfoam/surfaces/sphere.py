@@ -64,6 +64,11 @@ class Sphere:
         return 2
 
     @property
+    def precision(self) -> float:
+        """Loop integrals are exact."""
+        return 1e-6
+
+    @property
     def mesh(self) -> TriangleMesh:
         """A triangulation with about 10 000 nodes."""
         return self.triangulate(10_000)

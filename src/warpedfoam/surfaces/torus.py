@@ -80,6 +80,11 @@ class Torus:
         return 0
 
     @property
+    def precision(self) -> float:
+        """Loop integrals are exact."""
+        return 1e-6
+
+    @property
     def mesh(self) -> TriangleMesh:
         """A triangulation with about 10 000 nodes."""
         return self.triangulate(10_000)

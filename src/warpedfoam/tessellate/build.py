@@ -211,7 +211,7 @@ def _laid_out(
     short = chord < 0.3 * float(np.sqrt(surface.area / network.n_bubbles))
     offsets[short] = 0.0
     covered = bubble_integrals(cell, network, vertices, offsets, Layer.surface()).sum()
-    if abs(covered - surface.area) > 1e-6 * surface.area:
+    if not abs(covered - surface.area) <= surface.precision * surface.area:
         raise ResolutionError(TOO_LONG)
     return Foam(cell, network, vertices, offsets, targets, seed=seed)
 

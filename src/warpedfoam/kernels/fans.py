@@ -1,0 +1,56 @@
+"""Integrals over the inside of closed loops of arcs on any smooth surface, by fans of quadrature points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from warpedfoam.arrays import Floats
+from warpedfoam.kernels.height_arcs import Foot, dots
+from warpedfoam.kernels.loops import Loops
+from warpedfoam.kernels.quadrature import LobattoRule, gauss
+
+#: Rays' points from the centre to the film, and half-films per pass.
+RADIAL, CHUNK = 5, 4096
+
+#: At points (n, 3) of the surface: their normals, and the density to integrate.
+Sample = Callable[[Floats], tuple[Floats, Floats]]
+
+
+def fan_integrals(rule: LobattoRule, points: Floats, loops: Loops, foot: Foot, sample: Sample) -> Floats:
+    """∫ w dA inside each loop, (n_loops,), from the nodes (K, F, 3) of its arcs.
+
+    Rays run from a centre c to the arcs x(ξ) and down to the surface along the loop's own axis m, the
+    direction of its vector area ½ ∮ x × dx: dA = r m · ((x − c) × x') / (n · m) dr dξ.
+    """
+    xi, omega = gauss(rule.order + 2)
+    values = rule.interpolation(xi)
+    curve = np.tensordot(values, points, 1)
+    slope = np.tensordot(omega[:, None] * (values @ rule.derivative), points, 1)
+    film, owner = loops.halves >> 1, np.repeat(np.arange(len(loops.starts)), loops.sizes)
+    sign = np.where(loops.halves & 1, -1.0, 1.0)[:, None]
+    length = np.linalg.norm(slope, axis=2)
+    weight = np.add.reduceat(length.sum(axis=0)[film], loops.starts)
+    centre = np.add.reduceat((length[..., None] * curve).sum(axis=0)[film], loops.starts) / weight[:, None]
+    twist = np.cross(curve, slope).sum(axis=0)
+    run = slope.sum(axis=0)
+    # vector area about the loop's own centre, not the origin: far away loops keep their digits
+    turned = np.add.reduceat(sign * (twist[film] - np.cross(centre[owner], run[film])), loops.starts)
+    axis = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-300)
+    centre = foot(centre, axis)
+    radii, shares = gauss(RADIAL)
+    out = np.empty(len(film))
+    for lo in range(0, len(film), CHUNK):
+        part = slice(lo, lo + CHUNK)
+        own, arcs = owner[part], film[part]
+        m, c = axis[own], centre[own]
+        arm = curve[:, arcs] - c
+        flux = dots(np.cross(arm, slope[:, arcs]), m) * sign[part, 0]
+        flat = (c + radii[:, None, None, None] * arm).reshape(-1, 3)
+        down = np.broadcast_to(m, (len(radii), *arm.shape)).reshape(-1, 3)
+        normal, density = sample(foot(flat, down))
+        ratio = (density / dots(normal, down)).reshape(len(radii), *arm.shape[:2])
+        out[part] = np.einsum("r,rqf,qf->f", shares * radii, ratio, flux)
+    total: Floats = np.add.reduceat(out, loops.starts)
+    return total

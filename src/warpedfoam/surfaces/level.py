@@ -1,0 +1,348 @@
+"""`LevelSurface`: everything a foam needs, on the zero set of a smooth function."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from warpedfoam.arrays import Floats, Ints, as_generator, as_integer, as_points, frozen
+from warpedfoam.errors import MeshError
+from warpedfoam.kernels import height_arcs as arcs
+from warpedfoam.kernels.fans import fan_integrals
+from warpedfoam.kernels.loops import Loops
+from warpedfoam.kernels.nodal import bump_offsets
+from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.patches import PatchedMesh
+from warpedfoam.surfaces.protocol import ArcTerms, Layer
+
+#: Newton steps along a line to the surface, steps to the nearest point, rounds of the even lattice.
+LINE_STEPS, NEAREST_STEPS, LATTICE_ROUNDS = 12, 200, 40
+
+
+class LevelSurface(ABC):
+    """Base of surfaces given by f = 0, with f growing outwards (into the gap).
+
+    A subclass provides `level`, `triangulate`, `size` and `euler_characteristic`; all else follows:
+    n = ∇f/|∇f|, W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|. Films are `warpedfoam.kernels.height_arcs`, volumes
+    `warpedfoam.kernels.fans`, whole integrals are summed over a fine mesh.
+    """
+
+    #: Squared share of the normal component below which a rigid motion is a symmetry.
+    symmetry = 1e-13
+    #: Nodes of the mesh that carries integrals over the whole surface.
+    integral_nodes = 10_000
+
+    @abstractmethod
+    def level(self, points: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
+        """f (n,), its gradient (n, 3), and its second derivatives (n, 3, 3) if asked for."""
+
+    @abstractmethod
+    def triangulate(self, n_nodes: int) -> TriangleMesh:
+        """A triangulation with about ``n_nodes`` nodes, all on the surface."""
+
+    @property
+    @abstractmethod
+    def size(self) -> float:
+        """Radius of a ball round the origin that holds the surface."""
+
+    @property
+    @abstractmethod
+    def euler_characteristic(self) -> int:
+        """χ."""
+
+    @property
+    def precision(self) -> float:
+        """Relative error that loop integrals may show on a sound foam."""
+        return 1e-3
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """A triangulation with about 10 000 nodes."""
+        return self.triangulate(self.integral_nodes)
+
+    @cached_property
+    def area(self) -> float:
+        """Total area."""
+        return self.integral(Layer.surface())
+
+    # --- points -----------------------------------------------------------------------------------
+
+    def foot(self, points: Floats, axes: Floats) -> Floats:
+        """The points moved along their axes to the surface; NaN where a line does not meet it."""
+        out = points.copy()
+        live = np.arange(len(points))
+        scale = self.size
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            for _ in range(LINE_STEPS):
+                value, gradient, _ = self.level(out[live], second=False)
+                step = value / arcs.dots(gradient, axes[live])
+                step = np.clip(step, -0.2 * scale, 0.2 * scale)
+                out[live] -= step[:, None] * axes[live]
+                # a step leaves an error of its square
+                live = live[~(np.abs(step) <= 1e-8 * scale)]
+                if not live.size:
+                    return out
+        out[live] = np.nan
+        return out
+
+    def project(self, points: ArrayLike) -> Floats:
+        """Nearest points of the surface: x = p − (p − x)·n n, then down to the surface, until it stays.
+
+        Raises
+        ------
+        ValueError
+            If a point is so far away that it has no clear nearest point.
+        """
+        p = as_points(points, "points", minimum=0)
+        x = p.copy()
+        live = np.arange(len(p))
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            for _ in range(NEAREST_STEPS):
+                value, gradient, _ = self.level(x[live], second=False)
+                square = arcs.dots(gradient, gradient)
+                # first order: the foot of p on the tangent plane of the level set through x, moved to f = 0
+                ahead = p[live] - x[live]
+                lift = (arcs.dots(ahead, gradient) + value) / square
+                move = ahead - lift[:, None] * gradient
+                span = np.linalg.norm(move, axis=1)
+                move *= np.minimum(1.0, 0.1 * self.size / np.maximum(span, 1e-300))[:, None]
+                x[live] += move
+                live = live[~(span <= 1e-14 * self.size)]
+                if not live.size:
+                    return x
+        value, gradient, _ = self.level(x[live], second=False)
+        far = ~(np.abs(value) <= 1e-10 * self.size * np.linalg.norm(gradient, axis=1))
+        far |= ~(span[~(span <= 1e-14 * self.size)] <= 1e-8 * self.size)
+        if far.any():
+            raise ValueError(
+                f"points must lie near the surface, but point {int(live[far][0])} has no clear nearest point "
+                "on it"
+            )
+        return x
+
+    def _unit(self, points: Floats) -> Floats:
+        _, gradient, _ = self.level(points, second=False)
+        out: Floats = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+        return out
+
+    def _shape(self, points: Floats) -> tuple[Floats, Floats]:
+        """Normals (n, 3) and shape operators (n, 3, 3) at points of the surface."""
+        _, gradient, second = self.level(points, second=True)
+        assert second is not None
+        size = np.linalg.norm(gradient, axis=1)
+        normal = gradient / size[:, None]
+        flat = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+        return normal, np.matmul(np.matmul(flat, second), flat) / size[:, None, None]
+
+    def normals(self, points: ArrayLike) -> Floats:
+        """∇f/|∇f| at the projections of the points."""
+        return self._unit(self.project(points))
+
+    def principal_curvatures(self, points: ArrayLike) -> Floats:
+        """Eigenvalues of W in the tangent plane, the larger one first."""
+        _, shape = self._shape(self.project(points))
+        mean, gauss = _mean_gauss(shape)
+        root = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
+        return np.stack([mean + root, mean - root], axis=1)
+
+    def gaussian_curvature(self, points: ArrayLike) -> Floats:
+        """G = k1 k2."""
+        _, shape = self._shape(self.project(points))
+        return _mean_gauss(shape)[1]
+
+    # --- the whole surface ------------------------------------------------------------------------
+
+    @cached_property
+    def _patches(self) -> PatchedMesh:
+        return PatchedMesh(self.triangulate(self.integral_nodes), self.foot, self._unit)
+
+    @cached_property
+    def _moments(self) -> tuple[float, float, float, float, float]:
+        """∫ dA, ∫ H dA, ∫ G dA, and the range of the principal curvatures."""
+        points, weights = self._patches.quadrature()
+        _, shape = self._shape(points)
+        mean, gauss = _mean_gauss(shape)
+        root = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
+        return (
+            float(weights.sum()),
+            float(weights @ mean),
+            float(weights @ gauss),
+            float((mean - root).min()),
+            float((mean + root).max()),
+        )
+
+    def integral(self, layer: Layer) -> float:
+        """∫ (c0 + c1 H + c2 G) dA by Gauss quadrature over a fine mesh."""
+        return float(np.dot(layer.steiner, self._moments[:3]))
+
+    def curvature_range(self) -> tuple[float, float]:
+        """Least and greatest principal curvature on a fine mesh."""
+        return self._moments[3:]
+
+    def random_points(self, count: int, rng: object) -> Floats:
+        """Uniform by area: points of mesh triangles, kept with a chance in proportion to their stretch."""
+        n = as_integer(count, "count", minimum=0)
+        return self._patches.random_points(n, as_generator(rng, "rng"))
+
+    def lattice_points(self, count: int) -> Floats:
+        """Centres of even cells: Lloyd's method on fixed pseudo-random points."""
+        n = as_integer(count, "count", minimum=1)
+        crowd = self._patches.random_points(40 * n, np.random.default_rng(0))
+        centres = crowd[:n]
+        for _ in range(LATTICE_ROUNDS):
+            _, owner = cKDTree(centres).query(crowd, workers=-1)
+            size = np.bincount(owner, minlength=n)
+            sums = np.stack([np.bincount(owner, crowd[:, k], n) for k in range(3)], axis=1)
+            centres = np.where(size[:, None] > 0, sums / np.maximum(size, 1)[:, None], centres)
+        return self.project(centres)
+
+    def vertex_frames(self, points: Floats) -> Floats:
+        """Two tangent unit vectors e1, e2 with e1 × e2 = n, by the branchless rule of Duff et al. (2017)."""
+        return _frames(self._unit(points))
+
+    def retract(self, points: Floats, steps: Floats) -> Floats:
+        """Move in the tangent plane, then along the old normal to the surface."""
+        normal = self._unit(points)
+        frames = _frames(normal)
+        return self.foot(points + np.einsum("ni,nix->nx", steps, frames), normal)
+
+    def rigid_motions(self, points: Floats) -> Floats:
+        """Velocities of those translations and rotations that leave the surface where it is."""
+        spread = _generators(points - self._symmetries[1], self.size)
+        return np.einsum("ka,anx->knx", self._symmetries[0], spread)
+
+    @cached_property
+    def _symmetries(self) -> tuple[Floats, Floats]:
+        """Combinations (k, 6) of the six generators that are tangent everywhere, and the centre."""
+        points, weights = self._patches.quadrature()
+        centre = weights @ points / weights.sum()
+        spread = _generators(points - centre, self.size)
+        across = np.einsum("anx,nx->an", spread, self._unit(points))
+        tangent = (across * weights) @ across.T
+        whole = np.einsum("n,anx,bnx->ab", weights, spread, spread)
+        root = np.linalg.inv(np.linalg.cholesky(whole))
+        values, vectors = np.linalg.eigh(root @ tangent @ root.T)
+        return frozen((root.T @ vectors[:, values < self.symmetry]).T), frozen(centre)
+
+    # --- arcs -------------------------------------------------------------------------------------
+
+    def _arcs(self, tail: Floats, head: Floats, offsets: Floats) -> arcs.HeightArcs:
+        rule = lobatto(offsets.shape[1] + 1)
+        return arcs.place(rule, tail, head, (self._unit(tail), self._unit(head)), offsets, self.foot)
+
+    def arc_measure(self, tail: Floats, head: Floats, offsets: Floats, layer: Layer) -> Floats:
+        """Σ_t shares_t ∫ |d(x + t n)/dξ| dξ."""
+        placed = self._arcs(tail, head, offsets)
+        normals = np.zeros_like(placed.points)
+        if layer.heights.any():
+            normals = self._unit(placed.points.reshape(-1, 3)).reshape(placed.points.shape)
+        return arcs.film_measure(placed.rule, placed.points, normals, layer.heights, layer.shares)
+
+    def arc_terms(
+        self,
+        tail: Floats,
+        head: Floats,
+        offsets: Floats,
+        layer: Layer,
+        *,
+        tension: float,
+        jump: Floats | None,
+    ) -> ArcTerms:
+        """See `warpedfoam.kernels.height_arcs`."""
+        placed = self._arcs(tail, head, offsets)
+        shape = placed.points.shape
+        normal, bend = self._shape(placed.points.reshape(-1, 3))
+        normals, shapes = normal.reshape(shape), bend.reshape(*shape, 3)
+        frames = (_frames(normals[0]), _frames(normals[-1]))
+        moves = arcs.jacobians(placed, normals, shapes, frames)
+        second = jump is not None
+        value, gradient, hessian = arcs.film_terms(
+            placed, normals, shapes, moves, layer.heights, layer.shares, second=second
+        )
+        mean, gauss = _mean_gauss(shapes)
+        c0, c1, c2 = layer.steiner
+        volume, bending = arcs.swept_terms(placed, normals, c0 + c1 * mean + c2 * gauss, moves, second=second)
+        if hessian is not None and bending is not None and jump is not None:
+            hessian *= tension
+            hessian -= jump * bending
+        return ArcTerms(value, gradient, volume, hessian)
+
+    def arc_points(self, tail: Floats, head: Floats, offsets: Floats, xi: Floats) -> Floats:
+        """The polynomial through the nodes, brought to the surface along the arc's axis."""
+        placed = self._arcs(tail, head, offsets)
+        curve = np.einsum("mk,kfx->fmx", placed.rule.interpolation(xi), placed.points)
+        axes = np.broadcast_to(placed.axis[:, None], curve.shape)
+        return self.foot(curve.reshape(-1, 3), axes.reshape(-1, 3)).reshape(curve.shape)
+
+    def arc_fit(self, tail: Floats, head: Floats, arc: Ints, points: Floats, order: int) -> Floats:
+        """Least-squares bump 4 s ξ (1 − ξ) in the plane of each arc."""
+        placed = self._arcs(tail, head, np.zeros((len(tail), 1)))
+        square = arcs.dots(placed.left, placed.left)
+        along = np.cross(placed.left, placed.axis)
+        ahead = points - tail[arc]
+        xi = arcs.dots(ahead, along[arc]) / square[arc]
+        lift = arcs.dots(ahead, placed.left[arc]) / square[arc]
+        return bump_offsets(arc, xi, lift, len(tail), order)
+
+    def loop_integrals(
+        self, tail: Floats, head: Floats, offsets: Floats, loops: Loops, layer: Layer
+    ) -> Floats:
+        """Fans of quadrature points, see `warpedfoam.kernels.fans`."""
+        placed = self._arcs(tail, head, offsets)
+        c0, c1, c2 = layer.steiner
+
+        def sample(points: Floats) -> tuple[Floats, Floats]:
+            if c1 == 0.0 and c2 == 0.0:
+                return self._unit(points), np.full(len(points), c0)
+            normal, shape = self._shape(points)
+            mean, gauss = _mean_gauss(shape)
+            return normal, c0 + c1 * mean + c2 * gauss
+
+        return fan_integrals(placed.rule, placed.points, loops, self.foot, sample)
+
+
+def _mean_gauss(shape: Floats) -> tuple[Floats, Floats]:
+    """H and G of shape operators (…, 3, 3) whose third eigenvalue, along the normal, is 0."""
+    trace = np.einsum("...xx->...", shape)
+    square = np.einsum("...xy,...xy->...", shape, shape)
+    return 0.5 * trace, 0.5 * (trace**2 - square)
+
+
+def _frames(normals: Floats) -> Floats:
+    x, y, z = normals.T
+    sign = np.where(z >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    second = np.stack([b, sign + y * y * a, -y], axis=1)
+    return np.stack([first, second], axis=1)
+
+
+def _generators(points: Floats, size: float) -> Floats:
+    """Three translations and three rotations at the points, (6, n, 3), of similar strength."""
+    axes = np.eye(3)
+    shifts = np.broadcast_to(axes[:, None], (3, len(points), 3))
+    turns = np.cross(axes[:, None], points[None]) / size
+    return np.concatenate([shifts, turns])
+
+
+def require_meshable(mesh: TriangleMesh, chi: int) -> TriangleMesh:
+    """The mesh, if it is a closed manifold of Euler characteristic ``chi``.
+
+    Raises
+    ------
+    MeshError
+        If it is not: it was made too coarse for the surface.
+    """
+    mesh.require_closed_surface()
+    if mesh.euler_characteristic != chi:
+        raise MeshError(
+            f"the triangulation has Euler characteristic {mesh.euler_characteristic}, the surface {chi}; "
+            "ask for more nodes"
+        )
+    return mesh

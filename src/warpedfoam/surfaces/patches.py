@@ -1,0 +1,94 @@
+"""Curved patches over the triangles of a mesh: quadrature and random points on a smooth surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import permutations
+
+import numpy as np
+
+from warpedfoam.arrays import Floats, Ints
+from warpedfoam.kernels.height_arcs import Foot, dots
+from warpedfoam.surfaces.mesh import TriangleMesh
+
+#: Rules on a triangle (Dunavant 1985): degree 6 with 12 points, degree 4 with 6, as barycentric triples
+#: (whose permutations follow) and weights; meshes of more triangles than this take the second.
+RULES = (
+    (
+        (0.116786275726379, (0.501426509658179, 0.249286745170910, 0.249286745170910)),
+        (0.050844906370207, (0.873821971016996, 0.063089014491502, 0.063089014491502)),
+        (0.082851075618374, (0.053145049844817, 0.310352451033784, 0.636502499121399)),
+    ),
+    (
+        (0.223381589678011, (0.108103018168070, 0.445948490915965, 0.445948490915965)),
+        (0.109951743655322, (0.816847572980459, 0.091576213509771, 0.091576213509771)),
+    ),
+)
+MANY = 12_000
+
+
+def triangle_rule(which: int) -> tuple[Floats, Floats]:
+    """Barycentric points (k, 3) and weights (k,), which add up to 1, of one of `RULES`."""
+    points, weights = [], []
+    for weight, triple in RULES[which]:
+        orbit = sorted(set(permutations(triple)))
+        points += orbit
+        weights += [weight] * len(orbit)
+    shares = np.array(weights)
+    return np.array(points), shares / shares.sum()
+
+
+class PatchedMesh:
+    """Each triangle's points moved to the surface along the interpolated normals of its corners.
+
+    Neighbours share the normals along their edge, so the patches meet without gap or overlap.
+    """
+
+    def __init__(self, mesh: TriangleMesh, foot: Foot, unit: Callable[[Floats], Floats]) -> None:
+        self._mesh, self._foot, self._unit = mesh, foot, unit
+        self._normals = unit(mesh.nodes)
+        self._rule = triangle_rule(int(mesh.n_triangles > MANY))
+        self._ready: tuple[Floats, Floats] | None = None
+
+    def _lifted(self, triangles: Ints, shares: Floats) -> tuple[Floats, Floats]:
+        """Points (n, 3) of triangles at barycentric ``shares`` (n, 3), and dA over the unit triangle."""
+        corners, normals = self._mesh.nodes[triangles], self._normals[triangles]
+        flat = np.einsum("ni,nix->nx", shares, corners)
+        axes = np.einsum("ni,nix->nx", shares, normals)
+        points = self._foot(flat, axes)
+        n = self._unit(points)
+        slope = dots(axes, n)
+        height = dots(points - flat, axes) / dots(axes, axes)
+        sides = []
+        for i in (1, 2):
+            move = corners[:, i] - corners[:, 0] + height[:, None] * (normals[:, i] - normals[:, 0])
+            sides.append(move - (dots(move, n) / slope)[:, None] * axes)
+        return points, 0.5 * dots(np.cross(sides[0], sides[1]), n)
+
+    def quadrature(self) -> tuple[Floats, Floats]:
+        """Points of the surface and their weights, which add up to its area."""
+        if self._ready is None:
+            shares, weights = self._rule
+            triangles = np.repeat(self._mesh.triangles, len(shares), axis=0)
+            points, areas = self._lifted(triangles, np.tile(shares, (self._mesh.n_triangles, 1)))
+            self._ready = points, areas * np.tile(weights, self._mesh.n_triangles)
+        return self._ready
+
+    def random_points(self, count: int, rng: np.random.Generator) -> Floats:
+        """Points drawn uniformly by area, (count, 3)."""
+        _, weights = self.quadrature()
+        per = len(weights) // self._mesh.n_triangles
+        stretch = weights.reshape(-1, per) / self._rule[1]
+        most = 1.05 * stretch.max(axis=1)
+        found: list[Floats] = []
+        missing = count
+        while missing > 0:
+            draw = rng.random((missing + missing // 5 + 16, 4))
+            triangle = np.searchsorted(np.cumsum(most) / most.sum(), draw[:, 0])
+            a, b = draw[:, 1], draw[:, 2]
+            a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
+            points, area = self._lifted(self._mesh.triangles[triangle], np.stack([1.0 - a - b, a, b], axis=1))
+            kept = points[draw[:, 3] * most[triangle] < area][:missing]
+            found.append(kept)
+            missing -= len(kept)
+        return np.concatenate(found) if found else np.zeros((0, 3))
