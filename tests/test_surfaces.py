@@ -13,8 +13,9 @@ from scipy.stats import chi2
 
 import warpedfoam.surfaces
 from warpedfoam import Foam, HeleShawCell, Sphere, Surface, Torus
-from warpedfoam.surfaces import Layer
+from warpedfoam.surfaces import Layer, LevelSurface
 
+from .level_samples import FAMILY
 from .surface_samples import EXAMPLES, SURFACES, each_surface, foam_on, samples, scale_of
 
 
@@ -24,12 +25,12 @@ def surface_classes():
         for _, kind in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
             if kind.__module__.startswith("warpedfoam.surfaces") and hasattr(kind, "arc_terms"):
                 found.add(kind)
-    return found - {Surface}
+    return found - {Surface, LevelSurface}
 
 
 def test_every_surface_class_is_tested_and_is_a_surface():
-    assert surface_classes() == set(EXAMPLES)
-    for surface in SURFACES:
+    assert surface_classes() == set(EXAMPLES) | {type(member.surface) for member in FAMILY.values()}
+    for surface in [*SURFACES, *(member.surface for member in FAMILY.values())]:
         assert isinstance(surface, Surface)
 
 

@@ -41,21 +41,35 @@ from warpedfoam.moves import T1Event, t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import plot_foam, save_picture
 from warpedfoam.relax import Relaxation, relax
-from warpedfoam.surfaces import Ellipsoid, Sphere, Surface, Torus, TriangleMesh
+from warpedfoam.surfaces import (
+    Ellipsoid,
+    Implicit,
+    LevelSurface,
+    MeshSurface,
+    Sphere,
+    Surface,
+    Torus,
+    TriangleMesh,
+    mesh_report,
+    read_mesh,
+)
 from warpedfoam.tessellate import HeatGeodesics, geodesic_distances, voronoi_foam
 
 __version__ = "0.1.0"
 
 __all__ = [
     "CellNetwork",
-    "Ellipsoid",
     "ConvergenceError",
+    "Ellipsoid",
     "EquilibriumReport",
     "FileFormatError",
     "Foam",
     "HeatGeodesics",
     "HeleShawCell",
+    "Implicit",
+    "LevelSurface",
     "MeshError",
+    "MeshSurface",
     "Relaxation",
     "ResolutionError",
     "SideDistribution",
@@ -69,8 +83,10 @@ __all__ = [
     "equilibrium_report",
     "geodesic_distances",
     "load",
+    "mesh_report",
     "network_from_loops",
     "plot_foam",
+    "read_mesh",
     "relax",
     "save",
     "save_picture",

@@ -8,10 +8,12 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import PurePath
 from types import FrameType
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from warpedfoam.cli import CLOSED_PIPE
 from warpedfoam.cli.progress import progress_bars
@@ -27,8 +29,22 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+class SurfaceOrFile(TyperGroup):
+    """Takes the name of a mesh file where the name of a surface may stand."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """``foam thing.ply …`` is ``foam mesh thing.ply …``."""
+        if args and args[0] not in self.commands and PurePath(args[0]).suffix:
+            args = ["mesh", *args]
+        return super().resolve_command(ctx, args)
+
+
 foam_app = typer.Typer(
-    help="Build and relax a foam on a surface given here, without a file.", no_args_is_help=True
+    cls=SurfaceOrFile,
+    help="Build and relax a foam on a surface given here: its name, or that of a mesh file (foam thing.ply).",
+    no_args_is_help=True,
 )
 app.add_typer(foam_app, name="foam")
 
@@ -152,6 +168,79 @@ def sphere(
     _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
 
 
+@foam_app.command()
+def ellipsoid(
+    n_bubbles: Count = 200,
+    a: Annotated[float, typer.Option(help="Semi-axis along x.")] = 10.0,
+    b: Annotated[float, typer.Option(help="Semi-axis along y.")] = 12.0,
+    c: Annotated[float, typer.Option(help="Semi-axis along z.")] = 15.0,
+    gap: Gap = 0.5,
+    seed: Seed = 0,
+    seeds: Seeds = "random",
+    lloyd: Lloyd = 0,
+    volumes: Volumes = None,
+    order: Order = 4,
+    t1: T1 = True,
+    color_by: Color = "charge",
+    out: Folder = "out",
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """A foam between an ellipsoid and its parallel surface."""
+    surface = {"kind": "ellipsoid", "a": a, "b": b, "c": c}
+    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
+    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
+
+
+@foam_app.command()
+def mesh(
+    file: Annotated[str, typer.Argument(help="Triangle mesh: PLY, OBJ, STL, OFF, GLB.", metavar="MESH")],
+    gap: Gap,
+    n_bubbles: Count = 200,
+    seed: Seed = 0,
+    seeds: Seeds = "random",
+    lloyd: Lloyd = 0,
+    volumes: Volumes = None,
+    order: Order = 4,
+    t1: T1 = True,
+    color_by: Color = "charge",
+    out: Folder = "out",
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """A foam between the smooth surface through a closed mesh and its parallel surface."""
+    surface = {"kind": "mesh", "file": file}
+    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
+    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
+
+
+@app.command()
+def check(
+    file: Annotated[str, typer.Argument(help="Triangle mesh: PLY, OBJ, STL, OFF, GLB.", metavar="MESH")],
+    gap: Annotated[
+        float | None, typer.Option("--gap", help="Also: would plates this far apart fold?")
+    ] = None,
+    n_bubbles: Annotated[
+        int | None, typer.Option("-n", "--n-bubbles", help="Also: fine enough for so many bubbles?")
+    ] = None,
+    repair: Annotated[
+        str | None, typer.Option("--repair", metavar="FILE", help="Write a safely repaired mesh (PLY).")
+    ] = None,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Tell what is wrong with a mesh and what to do; exit code 1 if it cannot carry a foam."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.checking import check_file
+
+        sound, text, facts = check_file(file, gap=gap, n_bubbles=n_bubbles, repair=repair)
+        print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+    if not sound:
+        raise typer.Exit(NOT_CONVERGED)
+
+
 def _values(
     surface: dict[str, Any],
     n_bubbles: int,
@@ -205,7 +294,10 @@ def summary_text(record: Mapping[str, Any]) -> str:
     options, times = record["options"], record["timings"]
     surface = dict(options["surface"])
     kind = surface.pop("kind")
-    sizes = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in surface.items())
+    sizes = ", ".join(
+        f"{name.replace('_', ' ')} {value if isinstance(value, str) else f'{value:g}'}"
+        for name, value in surface.items()
+    )
     state = "converged" if record["converged"] else "NOT CONVERGED"
     sides = "   ".join(f"{n}: {count}" for n, count in record["sides"].items())
     outputs = list(record["outputs"].values())

@@ -6,6 +6,7 @@ import difflib
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,16 +15,18 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
-from warpedfoam.surfaces import Sphere, Surface, Torus
+from warpedfoam.surfaces import Ellipsoid, MeshSurface, Sphere, Surface, Torus
 from warpedfoam.tessellate.build import SEED_KINDS
 
 Section = TypeVar("Section")
 DEFAULT_BUBBLES = 200
 
 #: Each kind of surface and the sizes that it has unless told otherwise.
-SURFACES: Mapping[str, tuple[Callable[..., Surface], Mapping[str, float]]] = {
+SURFACES: Mapping[str, tuple[Callable[..., Surface], Mapping[str, float | str]]] = {
     "torus": (Torus, {"major_radius": 20.0, "minor_radius": 4.0}),
     "sphere": (Sphere, {"radius": 10.0}),
+    "ellipsoid": (Ellipsoid, {"a": 10.0, "b": 12.0, "c": 15.0}),
+    "mesh": (lambda file: MeshSurface.from_file(file), {"file": ""}),
 }
 
 
@@ -75,7 +78,7 @@ class SurfaceOptions:
     """Which surface, and its sizes."""
 
     kind: str = "torus"
-    sizes: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float | str] = field(default_factory=dict)
 
     def build(self) -> Surface:
         """Make the surface; sizes not given are those of `SURFACES`."""
@@ -132,8 +135,9 @@ class Options:
     relax: RelaxOptions = RelaxOptions()
     output: OutputOptions = OutputOptions()
 
-    def build_cell(self) -> HeleShawCell:
-        """Make the Hele-Shaw cell; sizes that contradict each other raise ``ValueError``."""
+    @cached_property
+    def plates(self) -> HeleShawCell:
+        """The Hele-Shaw cell, made once; sizes that contradict each other raise ``ValueError``."""
         return HeleShawCell(self.surface.build(), gap=self.cell.gap)
 
     @property
@@ -230,7 +234,7 @@ def options_from(values: Mapping[str, Any], source: str, origins: Mapping[str, s
     seed = places.read("seed", values["seed"], _at_least(0)) if "seed" in values else 0
     options = Options(seed=seed, surface=surface, **sections)
     try:
-        options.build_cell()
+        _ = options.plates
     except (TypeError, ValueError) as fault:
         raise ValueError(f"{source}: {fault}") from None
     return options
@@ -292,7 +296,10 @@ def _surface(table: Mapping[str, Any], places: _Places) -> SurfaceOptions:
     for name, value in table.items():
         if name != "kind":
             places.require_known(f"surface.{name}", _names(kind))
-            sizes[name] = places.read(f"surface.{name}", value, _above_zero)
+            reader = _text if isinstance(SURFACES[kind][1][name], str) else _above_zero
+            sizes[name] = places.read(f"surface.{name}", value, reader)
+    if kind == "mesh" and "file" not in sizes:
+        raise ValueError(f"{places.of('surface')}: surface.file is needed: the name of a mesh file")
     return SurfaceOptions(kind, sizes)
 
 

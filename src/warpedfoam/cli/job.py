@@ -72,7 +72,7 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
 
     folder = _folder(options.output.folder)
     started = datetime.now(UTC)
-    cell = options.build_cell()
+    cell = options.plates
     chosen = options.foam
     clock = [time.perf_counter()]
     start = voronoi_foam(

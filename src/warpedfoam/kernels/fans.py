@@ -11,20 +11,23 @@ from warpedfoam.kernels.height_arcs import Foot, dots
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.quadrature import LobattoRule, gauss
 
-#: Rays' points from the centre to the film, and half-films per pass.
-RADIAL, CHUNK = 5, 4096
+#: Half-films per pass.
+CHUNK = 4096
 
-#: At points (n, 3) of the surface: their normals, and the density to integrate.
-Sample = Callable[[Floats], tuple[Floats, Floats]]
+#: From points (n, 3) near the surface, along axes: normals where they land, and the density to integrate.
+Landing = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 
-def fan_integrals(rule: LobattoRule, points: Floats, loops: Loops, foot: Foot, sample: Sample) -> Floats:
+def fan_integrals(
+    rule: LobattoRule, points: Floats, loops: Loops, foot: Foot, land: Landing, n_radial: int
+) -> Floats:
     """∫ w dA inside each loop, (n_loops,), from the nodes (K, F, 3) of its arcs.
 
     Rays run from a centre c to the arcs x(ξ) and down to the surface along the loop's own axis m, the
-    direction of its vector area ½ ∮ x × dx: dA = r m · ((x − c) × x') / (n · m) dr dξ.
+    direction of its vector area ½ ∮ x × dx: dA = r m · ((x − c) × x') / (n · m) dr dξ. Gauss points:
+    ``n_radial`` on a ray, two more than the film's order along it (three where rays have two).
     """
-    xi, omega = gauss(rule.order + 2)
+    xi, omega = gauss(rule.order + 2 if n_radial > 2 else 3)
     values = rule.interpolation(xi)
     curve = np.tensordot(values, points, 1)
     slope = np.tensordot(omega[:, None] * (values @ rule.derivative), points, 1)
@@ -39,7 +42,9 @@ def fan_integrals(rule: LobattoRule, points: Floats, loops: Loops, foot: Foot, s
     turned = np.add.reduceat(sign * (twist[film] - np.cross(centre[owner], run[film])), loops.starts)
     axis = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-300)
     centre = foot(centre, axis)
-    radii, shares = gauss(RADIAL)
+    normal, _ = land(centre, axis)
+    tilt = normal / dots(normal, axis)[:, None]
+    radii, shares = gauss(n_radial)
     out = np.empty(len(film))
     for lo in range(0, len(film), CHUNK):
         part = slice(lo, lo + CHUNK)
@@ -47,9 +52,12 @@ def fan_integrals(rule: LobattoRule, points: Floats, loops: Loops, foot: Foot, s
         m, c = axis[own], centre[own]
         arm = curve[:, arcs] - c
         flux = dots(np.cross(arm, slope[:, arcs]), m) * sign[part, 0]
-        flat = (c + radii[:, None, None, None] * arm).reshape(-1, 3)
+        # the parabola that starts in the centre's tangent plane and ends on the film is nearly there
+        r = radii[:, None, None, None]
+        rise = -dots(arm, tilt[own])[..., None] * m
+        flat = (c + r * arm + r * (1.0 - r) * rise).reshape(-1, 3)
         down = np.broadcast_to(m, (len(radii), *arm.shape)).reshape(-1, 3)
-        normal, density = sample(foot(flat, down))
+        normal, density = land(flat, down)
         ratio = (density / dots(normal, down)).reshape(len(radii), *arm.shape[:2])
         out[part] = np.einsum("r,rqf,qf->f", shares * radii, ratio, flux)
     total: Floats = np.add.reduceat(out, loops.starts)

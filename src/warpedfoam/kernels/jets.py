@@ -18,12 +18,14 @@ POWERS = tuple((i, total - i) for total in range(5) for i in range(total, -1, -1
 #: Width of the fit's weights in spacings, rounds of fit and tilt, and a hair of stiffness for scarce nodes.
 WIDTH, ROUNDS, STIFFNESS = 2.0, 3, 1e-11
 #: Nodes per pass of the fit, points per pass of the level function.
-FIT_CHUNK, CHUNK = 8192, 16384
+FIT_CHUNK, CHUNK = 8192, 1536
 
 
 @dataclass(frozen=True, eq=False)
 class Jets:
-    """``points`` (n, 3), ``frames`` (n, 3, 3): rows e1, e2, n; ``spacing``, ``reach`` (n,): h and ρ;
+    """The jets of all nodes.
+
+    ``points`` (n, 3), ``frames`` (n, 3, 3): rows e1, e2, n; ``spacing``, ``reach`` (n,): h and ρ;
     ``coefficients`` (n, 15) of q by `POWERS`.
     """
 

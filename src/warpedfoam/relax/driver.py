@@ -37,6 +37,8 @@ EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
 LEAST_SHARE = 0.1
 #: Shifts of the exact steps, in γ d / ℓ.
 LEAST_SHIFT, MOST_SHIFT = 1e-10, 0.03
+#: Relative error that the total of rough volumes may show.
+DRAFT = 0.03
 #: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
 SADDLE, KICK = 1e-6, 0.05
 SLIPPED = (
@@ -171,7 +173,7 @@ def _iterate(
     exact = False
     sound = run.state
     while True:
-        lin = run.system.linearise(run.state)
+        lin = run.system.linearise(run.state, draft=not exact)
         now = lin.residuals
         if progress is not None:
             # the mean digit count of the vertices' residuals grows almost evenly with time
@@ -179,12 +181,15 @@ def _iterate(
         # the volumes of tiny bubbles cannot be held to twelve digits: a tenth of the mean counts instead
         held = float((np.abs(now.volume) / np.maximum(run.system.shares, LEAST_SHARE)).max())
         done = now.force <= tolerance and held <= max(0.01 * tolerance, 1e-12)
-        slipped = lin.slip > run.foam.cell.surface.precision
+        slipped = lin.slip > (DRAFT if lin.draft else run.foam.cell.surface.precision)
         if slipped or not np.isfinite(now.force):
             run.fault = SLIPPED if slipped else DEGENERATE
             run.state = sound
             return now, False
         sound = run.state
+        if lin.draft and (done or run.iteration >= limit):
+            exact = True
+            continue
         if done or run.iteration >= limit:
             condensed = lin.condensed(positive=False)
             run.is_minimum = _is_minimum(lin, _kkt(run, lin, condensed, LEAST_SHIFT), condensed)

@@ -6,14 +6,15 @@ are vertex steps, film offsets and pressures; the offsets are eliminated film by
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
 from warpedfoam.arrays import Floats, Ints
 from warpedfoam.cell import HeleShawCell
-from warpedfoam.energy import bubble_volumes, film_terms
+from warpedfoam.energy import film_terms
+from warpedfoam.foam import bubble_integrals
 from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.moves.t1 import outward_tangents
@@ -103,17 +104,17 @@ class System:
             clock.lap("pattern")
         return self._pattern
 
-    def linearise(self, state: State) -> Linearised:
-        """Forces, volumes and second derivatives at a state."""
-        return Linearised(self, state)
+    def linearise(self, state: State, *, draft: bool = False) -> Linearised:
+        """Forces, volumes and second derivatives at a state; a ``draft`` has rough volumes."""
+        return Linearised(self, state, draft and not self.invariant)
 
 
 class Linearised:
     """Forces, volume errors and film Hessians at one state."""
 
-    def __init__(self, system: System, state: State) -> None:
+    def __init__(self, system: System, state: State, draft: bool) -> None:
         clock = Stopwatch(system.timings)
-        self.system, self.state = system, state
+        self.system, self.state, self.draft = system, state, draft
         self.rigid: Floats | None = None
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             # a film without length makes forces undefined: `Residuals.force` is then infinite
@@ -146,7 +147,8 @@ class Linearised:
             # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
             modes = rigid_modes(system.cell, state)
             self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None
-        volumes = bubble_volumes(system.cell, network, state.points, state.offsets)
+        layer = replace(system.cell.layer, rays=2) if self.draft else system.cell.layer
+        volumes = bubble_integrals(system.cell, network, state.points, state.offsets, layer)
         self.volumes = volumes / system.mean_volume
         # one constraint is redundant: what all volumes together are off by (round-off, if nothing has
         # slipped) is shared out, or a single bubble would bear the round-off of all

@@ -1,10 +1,30 @@
 """Smooth surfaces and their triangulations; they know arcs, not foams."""
 
 from warpedfoam.surfaces.ellipsoid import Ellipsoid
+from warpedfoam.surfaces.files import read_mesh
+from warpedfoam.surfaces.health import MeshFinding, MeshReport, mesh_report, repaired
+from warpedfoam.surfaces.implicit import Implicit
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.mesh_surface import MeshSurface
 from warpedfoam.surfaces.protocol import ArcTerms, Layer, Surface
 from warpedfoam.surfaces.sphere import Sphere
 from warpedfoam.surfaces.torus import Torus
 
-__all__ = ["ArcTerms", "Ellipsoid", "Layer", "LevelSurface", "Sphere", "Surface", "Torus", "TriangleMesh"]
+__all__ = [
+    "ArcTerms",
+    "Ellipsoid",
+    "Implicit",
+    "Layer",
+    "LevelSurface",
+    "MeshFinding",
+    "MeshReport",
+    "MeshSurface",
+    "Sphere",
+    "Surface",
+    "Torus",
+    "TriangleMesh",
+    "mesh_report",
+    "read_mesh",
+    "repaired",
+]

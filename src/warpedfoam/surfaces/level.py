@@ -133,11 +133,28 @@ class LevelSurface(ABC):
     def _shape(self, points: Floats) -> tuple[Floats, Floats]:
         """Normals (n, 3) and shape operators (n, 3, 3) at points of the surface."""
         _, gradient, second = self.level(points, second=True)
-        assert second is not None
-        size = np.linalg.norm(gradient, axis=1)
-        normal = gradient / size[:, None]
-        flat = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-        return normal, np.matmul(np.matmul(flat, second), flat) / size[:, None, None]
+        normal, shape = _normal_shape(gradient, second)
+        assert shape is not None
+        return normal, shape
+
+    def _landed(self, points: Floats, axes: Floats, *, second: bool) -> tuple[Floats, Floats | None]:
+        """Normals and shape operators where lines from near points meet the surface, to about 1e-9.
+
+        One step and a look at where it led; only lines that are not there yet go on.
+        """
+        value, gradient, _ = self.level(points, second=False)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            step = value / arcs.dots(gradient, axes)
+            near = points - np.clip(step, -0.2 * self.size, 0.2 * self.size)[:, None] * axes
+            value, gradient, bend = self.level(near, second=second)
+            off = np.abs(value / arcs.dots(gradient, axes))
+            late = np.flatnonzero(~(off <= 1e-9 * self.size))
+            if late.size:
+                _, gradient[late], again = self.level(self.foot(near[late], axes[late]), second=second)
+                if bend is not None and again is not None:
+                    bend = np.array(bend)
+                    bend[late] = again
+        return _normal_shape(gradient, bend)
 
     def normals(self, points: ArrayLike) -> Floats:
         """∇f/|∇f| at the projections of the points."""
@@ -214,7 +231,8 @@ class LevelSurface(ABC):
     def rigid_motions(self, points: Floats) -> Floats:
         """Velocities of those translations and rotations that leave the surface where it is."""
         spread = _generators(points - self._symmetries[1], self.size)
-        return np.einsum("ka,anx->knx", self._symmetries[0], spread)
+        out: Floats = np.einsum("ka,anx->knx", self._symmetries[0], spread)
+        return out
 
     @cached_property
     def _symmetries(self) -> tuple[Floats, Floats]:
@@ -295,15 +313,28 @@ class LevelSurface(ABC):
         """Fans of quadrature points, see `warpedfoam.kernels.fans`."""
         placed = self._arcs(tail, head, offsets)
         c0, c1, c2 = layer.steiner
+        bent = c1 != 0.0 or c2 != 0.0
 
-        def sample(points: Floats) -> tuple[Floats, Floats]:
-            if c1 == 0.0 and c2 == 0.0:
-                return self._unit(points), np.full(len(points), c0)
-            normal, shape = self._shape(points)
+        def land(points: Floats, axes: Floats) -> tuple[Floats, Floats]:
+            normal, shape = self._landed(points, axes, second=bent)
+            if shape is None:
+                return normal, np.full(len(points), c0)
             mean, gauss = _mean_gauss(shape)
             return normal, c0 + c1 * mean + c2 * gauss
 
-        return fan_integrals(placed.rule, placed.points, loops, self.foot, sample)
+        return fan_integrals(placed.rule, placed.points, loops, self.foot, land, layer.rays)
+
+
+def _normal_shape(gradient: Floats, second: Floats | None) -> tuple[Floats, Floats | None]:
+    """n = ∇f/|∇f| and W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|."""
+    size = np.linalg.norm(gradient, axis=1)
+    normal = gradient / size[:, None]
+    if second is None:
+        return normal, None
+    bent = np.einsum("nxy,ny->nx", second, normal)
+    shape = second - normal[:, :, None] * bent[:, None] - bent[:, :, None] * normal[:, None]
+    shape += np.einsum("nx,nx->n", normal, bent)[:, None, None] * (normal[:, :, None] * normal[:, None])
+    return normal, shape / size[:, None, None]
 
 
 def _mean_gauss(shape: Floats) -> tuple[Floats, Floats]:

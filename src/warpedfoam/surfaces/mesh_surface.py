@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Floats, Ints, as_integer, frozen
 from warpedfoam.kernels.jets import Jets, blended, fit_jets
+from warpedfoam.surfaces.files import read_mesh
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
 
@@ -58,14 +59,22 @@ class MeshSurface(LevelSurface):
     True
     """
 
-    source: TriangleMesh
+    nodes: Floats
+    triangles: Ints
 
     symmetry = 1e-7
 
     def __init__(self, nodes: ArrayLike, triangles: ArrayLike) -> None:
         mesh = TriangleMesh(nodes, triangles)
         mesh.require_closed_surface()
-        object.__setattr__(self, "source", mesh)
+        object.__setattr__(self, "nodes", mesh.nodes)
+        object.__setattr__(self, "triangles", mesh.triangles)
+        self.__dict__["source"] = mesh
+
+    @cached_property
+    def source(self) -> TriangleMesh:
+        """The mesh as given."""
+        return TriangleMesh(self.nodes, self.triangles)
 
     def __repr__(self) -> str:
         return f"MeshSurface({self.source.n_nodes} nodes, {self.source.n_triangles} triangles)"
@@ -78,16 +87,14 @@ class MeshSurface(LevelSurface):
 
     @classmethod
     def from_file(cls, path: str | PathLike[str]) -> MeshSurface:
-        """Surface of a mesh file that trimesh reads: PLY, OBJ, STL, OFF, GLB …
+        """Surface of a mesh file that trimesh reads: PLY, OBJ, STL, OFF or GLB.
 
         Raises
         ------
-        OSError
-            If the file cannot be read.
-        MeshError
-            If it holds no triangle mesh, or one that `MeshSurface` refuses.
+        FileNotFoundError, MeshError
+            See `read_mesh`; also if the mesh is one that `MeshSurface` refuses.
         """
-        mesh = TriangleMesh.from_file(path)
+        mesh = read_mesh(path)
         return cls(mesh.nodes, mesh.triangles)
 
     @property

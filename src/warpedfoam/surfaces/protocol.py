@@ -27,12 +27,14 @@ class Layer:
     """Heights above the surface at which arcs are measured, and Steiner's coefficients of volumes.
 
     Along an arc: Σ_t shares_t · length of the arc lifted to height t. Inside a loop:
-    ∫ (c0 + c1 H + c2 G) dA with ``steiner`` = (c0, c1, c2).
+    ∫ (c0 + c1 H + c2 G) dA with ``steiner`` = (c0, c1, c2), by ``rays`` Gauss points from the centre to
+    the rim on surfaces without closed forms (2 for a draft).
     """
 
     heights: Floats
     shares: Floats
     steiner: tuple[float, float, float]
+    rays: int = 6
 
     @classmethod
     def surface(cls) -> Layer:

@@ -1,0 +1,169 @@
+"""`Implicit`: the zero set of a user's own function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+
+from warpedfoam.arrays import Floats, as_floats, as_integer, frozen
+from warpedfoam.errors import MeshError
+from warpedfoam.kernels.nets import surface_net
+from warpedfoam.surfaces.level import LevelSurface
+from warpedfoam.surfaces.mesh import TriangleMesh
+
+#: Grid points of the first look, nodes of a net per area in squared grid steps, smoothing rounds.
+FIRST_LOOK, PER_CELL, ROUNDS = 40, 1.5, 30
+#: Step of second derivatives by differences, and largest error of the user's gradient; in sizes, relative.
+STEP, GRADIENT_ERROR = 1e-5, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Implicit(LevelSurface):
+    """Closed surface f = 0 inside a box, from f and its gradient; f grows into the gap.
+
+    Parameters
+    ----------
+    function : callable
+        f at points (n, 3), returning (n,); smooth, at least three times differentiable.
+    gradient : callable
+        ∇f at points (n, 3), returning (n, 3).
+    bounds : (2, 3) array
+        Lower and upper corner of a box that holds the surface with room to spare.
+    hessian : callable, optional
+        ∇²f, returning (n, 3, 3); central differences of the gradient by default.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a function is not callable, returns the wrong shape, or ``gradient`` is not f's gradient.
+    MeshError
+        If f does not change sign in the box, or f = 0 reaches its walls or is not one closed surface.
+
+    Examples
+    --------
+    A torus:
+
+    >>> def f(x):
+    ...     return (np.hypot(x[:, 0], x[:, 1]) - 3.0) ** 2 + x[:, 2] ** 2 - 1.0
+    >>> def grad(x):
+    ...     q = np.hypot(x[:, 0], x[:, 1])
+    ...     s = 2.0 * (q - 3.0) / q
+    ...     return np.stack([s * x[:, 0], s * x[:, 1], 2.0 * x[:, 2]], axis=1)
+    >>> ring = Implicit(f, grad, [[-4.5, -4.5, -1.5], [4.5, 4.5, 1.5]])
+    >>> ring.euler_characteristic, bool(abs(ring.area / (12.0 * np.pi**2) - 1.0) < 1e-5)
+    (0, True)
+    """
+
+    function: Callable[[Floats], Floats]
+    gradient: Callable[[Floats], Floats]
+    bounds: Floats
+    hessian: Callable[[Floats], Floats] | None = None
+
+    def __init__(
+        self,
+        function: Callable[[Floats], Floats],
+        gradient: Callable[[Floats], Floats],
+        bounds: ArrayLike,
+        hessian: Callable[[Floats], Floats] | None = None,
+    ) -> None:
+        for name, item in (("function", function), ("gradient", gradient), ("hessian", hessian)):
+            if not callable(item) and not (name == "hessian" and item is None):
+                raise TypeError(f"{name} must be callable, got {type(item).__name__}")
+        box = as_floats(bounds, "bounds", (2, 3))
+        if not (box[0] < box[1]).all():
+            raise ValueError("bounds must be two corners, the lower one first, with room between them")
+        put = object.__setattr__
+        put(self, "function", function)
+        put(self, "gradient", gradient)
+        put(self, "hessian", hessian)
+        put(self, "bounds", frozen(box))
+        nodes, _ = self._net(float((box[1] - box[0]).max()) / FIRST_LOOK)
+        self._check_gradient(nodes)
+
+    def _check_gradient(self, points: Floats) -> None:
+        h = STEP * self.size
+        slopes = [(self._f(points + h * e) - self._f(points - h * e)) / (2.0 * h) for e in np.eye(3)]
+        given = self._g(points)
+        fault = np.abs(np.stack(slopes, axis=1) - given).max(axis=1)
+        if not (fault <= GRADIENT_ERROR * np.linalg.norm(given, axis=1).max()).all():
+            bad = int(np.nanargmax(fault))
+            found = [round(float(slope[bad]), 4) for slope in slopes]
+            raise ValueError(
+                f"gradient is not that of function: at {points[bad].round(4).tolist()} it is "
+                f"{given[bad].round(4).tolist()}, differences of function give {found}"
+            )
+
+    def _f(self, points: Floats) -> Floats:
+        return as_floats(self.function(points), "function's values", (len(points),))
+
+    def _g(self, points: Floats) -> Floats:
+        return as_floats(self.gradient(points), "gradient's values", (len(points), 3))
+
+    @property
+    def size(self) -> float:
+        """Distance of the farthest corner of the box from the origin."""
+        return float(np.linalg.norm(np.abs(self.bounds).max(axis=0)))
+
+    @property
+    def euler_characteristic(self) -> int:
+        """χ of a triangulation."""
+        return self.triangulate(4000).euler_characteristic
+
+    def level(self, points: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
+        """The user's function."""
+        safe = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, self.bounds[0])
+        if not len(points):
+            return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)) if second else None
+        value, slope = self._f(safe), self._g(safe)
+        if not second:
+            return value, slope, None
+        if self.hessian is not None:
+            return value, slope, as_floats(self.hessian(safe), "hessian's values", (len(points), 3, 3))
+        h = STEP * self.size
+        rows = [(self._g(safe + h * e) - self._g(safe - h * e)) / (2.0 * h) for e in np.eye(3)]
+        bend = np.stack(rows, axis=1)
+        return value, slope, 0.5 * (bend + bend.transpose(0, 2, 1))
+
+    def triangulate(self, n_nodes: int) -> TriangleMesh:
+        """A surface net on a grid of the right step, evened out and moved to the surface."""
+        count = as_integer(n_nodes, "n_nodes", minimum=50)
+        known: dict[int, TriangleMesh] = self.__dict__.setdefault("_meshes", {})
+        if count not in known:
+            span = self.bounds[1] - self.bounds[0]
+            step = float(span.max()) / FIRST_LOOK
+            nodes, _ = self._net(step)
+            for _ in range(2):
+                step = max(step * np.sqrt(len(nodes) / count), float(span.max()) / 1000.0)
+                nodes, triangles = self._net(step)
+            known[count] = self._evened(nodes, triangles)
+        return known[count]
+
+    def _net(self, step: float) -> tuple[Floats, np.ndarray]:
+        low, high = self.bounds
+        cells = np.maximum(np.ceil((high - low) / step).astype(int), 4)
+        axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        values = self._f(grid.reshape(-1, 3)).reshape(grid.shape[:3])
+        if not (values < 0.0).any() or not (values > 0.0).any():
+            raise MeshError("function does not change sign inside bounds: there is no surface to mesh")
+        walls = [np.moveaxis(values, axis, 0)[[0, -1]] for axis in range(3)]
+        if len({bool(s) for wall in walls for s in np.unique(wall < 0.0)}) > 1:
+            raise MeshError("the surface reaches the walls of bounds; choose a larger box")
+        nodes, triangles = surface_net(values)
+        return low + nodes * (high - low) / cells, triangles
+
+    def _evened(self, nodes: Floats, triangles: np.ndarray) -> TriangleMesh:
+        mesh = TriangleMesh(nodes, triangles)
+        mesh.require_closed_surface()
+        a, b = mesh.edges.T
+        n = mesh.n_nodes
+        graph = coo_array((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
+        degree: Floats = np.asarray(graph.sum(axis=1))[:, None]
+        x = self.project(nodes)
+        for _ in range(ROUNDS):
+            x = self.foot(x + 0.5 * (np.asarray(graph @ x) / degree - x), self._unit(x))
+        return TriangleMesh(frozen(x), triangles)

@@ -1,0 +1,72 @@
+"""Members of the family of `LevelSurface`, with what is known of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+
+from warpedfoam import Ellipsoid, HeleShawCell, Implicit, MeshSurface, Sphere, Torus, relax, voronoi_foam
+
+RING, TUBE = 3.0, 1.0
+
+
+def ring_level(x):
+    """A torus of radii 3 and 1."""
+    return (np.hypot(x[:, 0], x[:, 1]) - RING) ** 2 + x[:, 2] ** 2 - TUBE**2
+
+
+def ring_gradient(x):
+    q = np.hypot(x[:, 0], x[:, 1])
+    share = 2.0 * (q - RING) / q
+    return np.stack([share * x[:, 0], share * x[:, 1], 2.0 * x[:, 2]], axis=1)
+
+
+RING_BOX = [[-4.6, -4.6, -1.6], [4.6, 4.6, 1.6]]
+
+
+def jittered(surface, n_nodes, share=0.2, seed=0):
+    """Nodes of a triangulation pushed about by a share of an edge, back on the surface; triangles."""
+    mesh = surface.triangulate(n_nodes)
+    push = np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.nodes.shape)
+    return surface.project(mesh.nodes + share * mesh.mean_edge * push), mesh.triangles
+
+
+@dataclass(frozen=True)
+class Member:
+    """A surface; its formula twin, if any; χ, symmetries, relative error of its reconstruction."""
+
+    surface: object
+    twin: object
+    euler: int
+    symmetries: int
+    error: float
+
+
+FAMILY = {
+    "ball": Member(Ellipsoid(1.0, 1.0, 1.0), Sphere(1.0), 2, 3, 1e-12),
+    "egg": Member(Ellipsoid(1.0, 1.2, 1.5), None, 2, 0, 1e-12),
+    "disk": Member(Ellipsoid(3.0, 3.0, 2.0), None, 2, 1, 1e-12),
+    "ring": Member(Implicit(ring_level, ring_gradient, RING_BOX), Torus(RING, TUBE), 0, 1, 1e-8),
+    "mesh": Member(MeshSurface(*jittered(Torus(RING, TUBE), 4000)), Torus(RING, TUBE), 0, 1, 1e-3),
+}
+
+each_member = pytest.mark.parametrize("member", FAMILY.values(), ids=FAMILY)
+formulas = pytest.mark.parametrize(
+    "member",
+    [m for m in FAMILY.values() if m.error < 1e-6],
+    ids=[k for k, m in FAMILY.items() if m.error < 1e-6],
+)
+twins = pytest.mark.parametrize(
+    "member", [m for m in FAMILY.values() if m.twin is not None], ids=[k for k, m in FAMILY.items() if m.twin]
+)
+
+
+@cache
+def relaxed_on(name, order=4, gap=0.05):
+    """A relaxed foam on a member of the family."""
+    cell = HeleShawCell(FAMILY[name].surface, gap=gap)
+    n_bubbles = 80 if FAMILY[name].euler else 240
+    return relax(voronoi_foam(cell, n_bubbles, seeds="blue", seed=2, order=order))
