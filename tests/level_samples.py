@@ -8,7 +8,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from warpedfoam import Ellipsoid, HeleShawCell, Implicit, MeshSurface, Sphere, Torus, relax, voronoi_foam
+from warpedfoam import (
+    Ellipsoid,
+    FlatTorus,
+    HeleShawCell,
+    Implicit,
+    MeshSurface,
+    SchwarzP,
+    Sphere,
+    Torus,
+    relax,
+    voronoi_foam,
+)
 
 RING, TUBE = 3.0, 1.0
 
@@ -50,8 +61,13 @@ FAMILY = {
     "egg": Member(Ellipsoid(1.0, 1.2, 1.5), None, 2, 0, 1e-12),
     "disk": Member(Ellipsoid(3.0, 3.0, 2.0), None, 2, 1, 1e-12),
     "ring": Member(Implicit(ring_level, ring_gradient, RING_BOX), Torus(RING, TUBE), 0, 1, 1e-8),
-    "mesh": Member(MeshSurface(*jittered(Torus(RING, TUBE), 4000)), Torus(RING, TUBE), 0, 1, 1e-3),
+    "sheet": Member(FlatTorus(10.0, 8.0), None, 0, 2, 1e-12),
+    "crystal": Member(SchwarzP(6.0), None, -4, 0, 1e-12),
+    "mesh": Member(MeshSurface(*jittered(Torus(RING, TUBE), 3000)), Torus(RING, TUBE), 0, 1, 2e-3),
 }
+
+#: Bubbles that resolve the narrow ones.
+COUNTS = {"ring": 240, "mesh": 160, "crystal": 200}
 
 each_member = pytest.mark.parametrize("member", FAMILY.values(), ids=FAMILY)
 formulas = pytest.mark.parametrize(
@@ -68,5 +84,5 @@ twins = pytest.mark.parametrize(
 def relaxed_on(name, order=4, gap=0.05):
     """A relaxed foam on a member of the family."""
     cell = HeleShawCell(FAMILY[name].surface, gap=gap)
-    n_bubbles = 80 if FAMILY[name].euler else 240
+    n_bubbles = COUNTS.get(name, 80)
     return relax(voronoi_foam(cell, n_bubbles, seeds="blue", seed=2, order=order))

@@ -9,6 +9,7 @@ from warpedfoam import Ellipsoid, Foam, HeleShawCell, Implicit, Sphere, equilibr
 from warpedfoam.energy import film_terms
 from warpedfoam.foam import bubble_integrals
 from warpedfoam.kernels.nets import surface_net
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces import Layer, TriangleMesh
 from warpedfoam.surfaces.patches import RULES, triangle_rule
 
@@ -44,7 +45,8 @@ def test_levels_are_differentiated_right(member):
     np.testing.assert_allclose(
         np.stack(slope, axis=1) / (2 * h), gradient, atol=1e-7 * np.abs(gradient).max()
     )
-    np.testing.assert_allclose(np.stack(bend, axis=1) / (2 * h), second, atol=1e-5 * np.abs(second).max())
+    atol = 1e-5 * np.abs(second).max() + 1e-12
+    np.testing.assert_allclose(np.stack(bend, axis=1) / (2 * h), second, atol=atol)
 
 
 @each_member
@@ -54,7 +56,7 @@ def test_projection_is_idempotent_and_along_the_normal(member):
     tiny = 1e-12 * surface.size
     np.testing.assert_allclose(surface.project(x), x, atol=tiny)
     low, high = surface.curvature_range()
-    rise = 0.2 / max(-low, high)
+    rise = 0.2 / max(-low, high, 1.0)
     for t in (-rise, rise):
         if member.error < 1e-6 or abs(t) < 0.1:
             back = surface.project(x + t * surface.normals(x))
@@ -138,7 +140,7 @@ def test_triangulations_are_closed_and_on_the_surface(member, n_nodes):
     assert mesh.euler_characteristic == member.euler
     np.testing.assert_allclose(surface.project(mesh.nodes), mesh.nodes, atol=1e-9 * surface.size)
     assert surface.area == pytest.approx(mesh.area, rel=0.03)
-    corners = mesh.nodes[mesh.triangles]
+    corners = mesh.corners
     out = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (np.einsum("tx,tx->t", out, surface.normals(mesh.nodes[mesh.triangles[:, 0]])) > 0).all()
 
@@ -152,7 +154,11 @@ def test_random_points_are_uniform_by_area(member):
     np.testing.assert_array_equal(points, again)
     nodes, weights = surface._patches.quadrature()
     centres = surface.random_points(25, 8)
-    nearest = [np.linalg.norm(x[:, None] - centres, axis=2).argmin(axis=1) for x in (points, nodes)]
+    period = surface.period
+    nearest = [
+        np.linalg.norm(nearest_image(x[:, None] - centres, period), axis=2).argmin(axis=1)
+        for x in (points, nodes)
+    ]
     counts = np.bincount(nearest[0], minlength=25)
     share = np.bincount(nearest[1], weights, minlength=25) / weights.sum()
     expected = 20_000 * share
@@ -163,7 +169,7 @@ def test_random_points_are_uniform_by_area(member):
 @each_member
 def test_lattice_points_are_even(member):
     points = member.surface.lattice_points(150)
-    gaps = np.linalg.norm(points[:, None] - points, axis=2)
+    gaps = np.linalg.norm(nearest_image(points[:, None] - points, member.surface.period), axis=2)
     np.fill_diagonal(gaps, np.inf)
     spacing = np.sqrt(member.surface.area / 150)
     assert gaps.min() > 0.6 * spacing
@@ -315,7 +321,7 @@ def test_pressure_identity_holds(member):
     assert report.angle_error < 1e-5 + member.error
 
 
-@pytest.mark.parametrize(("name", "tolerance"), [("ball", 1e-11), ("ring", 1e-9), ("mesh", 1e-5)])
+@pytest.mark.parametrize(("name", "tolerance"), [("ball", 1e-11), ("ring", 1e-9), ("mesh", 2e-5)])
 def test_energies_are_those_of_the_closed_forms(name, tolerance):
     """The same bubbles relaxed on the formula surface, whose films and volumes are other code."""
     member = FAMILY[name]

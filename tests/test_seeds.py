@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist, pdist, squareform
 
+from warpedfoam.kernels.thinning import accepted
 from warpedfoam.surfaces import Sphere, Torus
 from warpedfoam.tessellate.colouring import colour_graph, colour_seeds
 from warpedfoam.tessellate.seeds import (
-    _accepted,
     blue_noise_seeds,
     check_seeds,
     lattice_seeds,
@@ -84,7 +84,7 @@ def test_darts_in_rounds_are_darts_one_after_another(n, density, seed):
     for dart in range(n):
         if not close[taken, dart].any():
             taken.append(dart)
-    np.testing.assert_array_equal(np.flatnonzero(_accepted(n, np.array(np.nonzero(close)))), taken)
+    np.testing.assert_array_equal(np.flatnonzero(accepted(n, np.array(np.nonzero(close)))), taken)
 
 
 @pytest.mark.parametrize("make", MAKERS)

@@ -43,9 +43,11 @@ from warpedfoam.plot import plot_foam, save_picture
 from warpedfoam.relax import Relaxation, relax
 from warpedfoam.surfaces import (
     Ellipsoid,
+    FlatTorus,
     Implicit,
     LevelSurface,
     MeshSurface,
+    SchwarzP,
     Sphere,
     Surface,
     Torus,
@@ -63,6 +65,7 @@ __all__ = [
     "Ellipsoid",
     "EquilibriumReport",
     "FileFormatError",
+    "FlatTorus",
     "Foam",
     "HeatGeodesics",
     "HeleShawCell",
@@ -72,6 +75,7 @@ __all__ = [
     "MeshSurface",
     "Relaxation",
     "ResolutionError",
+    "SchwarzP",
     "SideDistribution",
     "Sphere",
     "Surface",

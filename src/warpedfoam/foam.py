@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from warpedfoam.arrays import Floats, Ints, as_floats, as_indices, as_integer, as_number, as_points, frozen
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import TopologyError
+from warpedfoam.kernels.periodic import loop_shifts, nearest_image
 from warpedfoam.kernels.quadrature import gauss, lobatto
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.surfaces.protocol import Layer
@@ -195,8 +196,11 @@ class Foam:
 
     @property
     def film_ends(self) -> tuple[Floats, Floats]:
-        """Points where each film starts and ends, two (n_films, 3) arrays."""
-        return self.vertex_points[self.network.tails], self.vertex_points[self.network.heads]
+        """Points where each film starts and ends (its image next to the start), two (n_films, 3) arrays."""
+        tail, head = self.vertex_points[self.network.tails], self.vertex_points[self.network.heads]
+        if self.cell.surface.period is not None:
+            head = tail + nearest_image(head - tail, self.cell.surface.period)
+        return tail, head
 
     @cached_property
     def film_areas(self) -> Floats:
@@ -238,12 +242,31 @@ class Foam:
         film, owner = halves >> 1, self.network.bubble[halves]
         sign = np.where(halves & 1, -1.0, 1.0)[:, None]
         weight = self.film_lengths[film][:, None]
-        parts = np.hstack([weight * points[film], sign * np.cross(points, head - tail)[film], weight])
+        middle = points[film]
+        shifts = self.loop_shifts
+        if shifts is not None:
+            middle = middle + shifts
+        parts = np.hstack([weight * middle, sign * np.cross(middle, (head - tail)[film]), weight])
         sums = np.stack([np.bincount(owner, part, minlength=count) for part in parts.T], axis=1)
         # a hair along the loop's vector area, so that a hemisphere has a centre too
         normal = sums[:, 3:6] / np.maximum(np.linalg.norm(sums[:, 3:6], axis=1, keepdims=True), 1e-300)
         mean = sums[:, :3] / sums[:, 6:] + 1e-3 * self.bubble_size * normal
         return frozen(self.cell.surface.project(mean))
+
+    @cached_property
+    def loop_shifts(self) -> Floats | None:
+        """Whole periods (m, 3) that join the half-films of ``network.loops`` next to the origin, or None."""
+        if self.cell.surface.period is None:
+            return None
+        loops, (tail, head) = self.network.loops, self.film_ends
+        film, back = loops.halves >> 1, (loops.halves & 1).astype(bool)[:, None]
+        start, end = np.where(back, head[film], tail[film]), np.where(back, tail[film], head[film])
+        shifts = loop_shifts(start, end, loops, self.cell.surface.period)
+        assert shifts is not None
+        # of all images of a bubble take the one next to the origin
+        middle = np.add.reduceat(start + shifts, loops.starts) / loops.sizes[:, None]
+        inward = nearest_image(middle, self.cell.surface.period) - middle
+        return shifts + np.repeat(inward, loops.sizes, axis=0)
 
     def film_curves(self, k: int = 16) -> Floats:
         """``k`` points along each film, ends included, for drawing: (n_films, k, 3).

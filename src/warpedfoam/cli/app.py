@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import signal
 import sys
@@ -121,99 +122,85 @@ def run(
     _run(options, as_json=as_json, quiet=quiet, debug=debug)
 
 
-@foam_app.command()
-def torus(
-    n_bubbles: Count = 200,
-    major_radius: Annotated[float, typer.Option(help="Radius of the ring.")] = 20.0,
-    minor_radius: Annotated[float, typer.Option(help="Radius of the tube.")] = 4.0,
-    gap: Gap = 0.5,
-    seed: Seed = 0,
-    seeds: Seeds = "random",
-    lloyd: Lloyd = 0,
-    volumes: Volumes = None,
-    order: Order = 4,
-    t1: T1 = True,
-    color_by: Color = "charge",
-    out: Folder = "out",
-    as_json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """A foam between two tori; normals point out of the tube, the gap lies outside."""
-    surface = {"kind": "torus", "major_radius": major_radius, "minor_radius": minor_radius}
-    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
-    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
+def _add_surface(kind: str, about: str, helps: Mapping[str, str]) -> None:
+    """Add ``foam KIND``: the surface's sizes, then the options that all surfaces share."""
+    from warpedfoam.cli.sizes import SIZES
+
+    sizes = SIZES[kind]
+    plain = inspect.Parameter.KEYWORD_ONLY
+    parameters = []
+    for name, default in sizes.items():
+        if isinstance(default, str):
+            note: Any = typer.Argument(help=helps[name], metavar="MESH")
+            parameters.append(inspect.Parameter(name, plain, annotation=Annotated[str, note]))
+        else:
+            option = Annotated[float, typer.Option(help=helps[name])]
+            parameters.append(inspect.Parameter(name, plain, default=default, annotation=option))
+    parameters += [
+        inspect.Parameter(name, plain, default=default, annotation=annotation)
+        for name, (annotation, default) in SHARED.items()
+    ]
+    if kind == "mesh":
+        # who knows in which unit a file is
+        parameters = [p.replace(default=p.empty) if p.name == "gap" else p for p in parameters]
+
+    def command(**given: Any) -> None:
+        surface = {"kind": kind, **{name: given[name] for name in sizes}}
+        _run(
+            lambda: _checked(_values(surface, given)),
+            as_json=given["as_json"],
+            quiet=given["quiet"],
+            debug=given["debug"],
+        )
+
+    command.__doc__ = about
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    foam_app.command(name=kind.replace("_", "-"))(command)
 
 
-@foam_app.command()
-def sphere(
-    n_bubbles: Count = 200,
-    radius: Annotated[float, typer.Option(help="Radius of the inner plate.")] = 10.0,
-    gap: Gap = 0.5,
-    seed: Seed = 0,
-    seeds: Seeds = "random",
-    lloyd: Lloyd = 0,
-    volumes: Volumes = None,
-    order: Order = 4,
-    t1: T1 = True,
-    color_by: Color = "charge",
-    out: Folder = "out",
-    as_json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """A foam between two concentric spheres."""
-    surface = {"kind": "sphere", "radius": radius}
-    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
-    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
-
-
-@foam_app.command()
-def ellipsoid(
-    n_bubbles: Count = 200,
-    a: Annotated[float, typer.Option(help="Semi-axis along x.")] = 10.0,
-    b: Annotated[float, typer.Option(help="Semi-axis along y.")] = 12.0,
-    c: Annotated[float, typer.Option(help="Semi-axis along z.")] = 15.0,
-    gap: Gap = 0.5,
-    seed: Seed = 0,
-    seeds: Seeds = "random",
-    lloyd: Lloyd = 0,
-    volumes: Volumes = None,
-    order: Order = 4,
-    t1: T1 = True,
-    color_by: Color = "charge",
-    out: Folder = "out",
-    as_json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """A foam between an ellipsoid and its parallel surface."""
-    surface = {"kind": "ellipsoid", "a": a, "b": b, "c": c}
-    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
-    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
-
-
-@foam_app.command()
-def mesh(
-    file: Annotated[str, typer.Argument(help="Triangle mesh: PLY, OBJ, STL, OFF, GLB.", metavar="MESH")],
-    gap: Gap,
-    n_bubbles: Count = 200,
-    seed: Seed = 0,
-    seeds: Seeds = "random",
-    lloyd: Lloyd = 0,
-    volumes: Volumes = None,
-    order: Order = 4,
-    t1: T1 = True,
-    color_by: Color = "charge",
-    out: Folder = "out",
-    as_json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """A foam between the smooth surface through a closed mesh and its parallel surface."""
-    surface = {"kind": "mesh", "file": file}
-    values = _values(surface, n_bubbles, gap, seed, seeds, lloyd, volumes, order, t1, color_by, out)
-    _run(lambda: _checked(values), as_json=as_json, quiet=quiet, debug=debug)
+#: Options of every surface, with their defaults.
+SHARED: Mapping[str, tuple[Any, Any]] = {
+    "n_bubbles": (Count, 200),
+    "gap": (Gap, 0.5),
+    "seed": (Seed, 0),
+    "seeds": (Seeds, "random"),
+    "lloyd": (Lloyd, 0),
+    "volumes": (Volumes, None),
+    "order": (Order, 4),
+    "t1": (T1, True),
+    "color_by": (Color, "charge"),
+    "out": (Folder, "out"),
+    "as_json": (Json, False),
+    "quiet": (Quiet, False),
+    "debug": (Debug, False),
+}
+_add_surface(
+    "torus",
+    "A foam between two tori; normals point out of the tube, the gap lies outside.",
+    {"major_radius": "Radius of the ring.", "minor_radius": "Radius of the tube."},
+)
+_add_surface("sphere", "A foam between two concentric spheres.", {"radius": "Radius of the inner plate."})
+_add_surface(
+    "ellipsoid",
+    "A foam between an ellipsoid and its parallel surface.",
+    {"a": "Semi-axis along x.", "b": "Semi-axis along y.", "c": "Semi-axis along z."},
+)
+_add_surface(
+    "flat_torus",
+    "A foam between two flat plates, repeating in both directions.",
+    {"width": "Period along x.", "height": "Period along y."},
+)
+_add_surface(
+    "schwarz_p",
+    "A foam on one translational unit of Schwarz's P surface, repeating in space.",
+    {"cell_length": "Period along x, y and z."},
+)
+_add_surface(
+    "mesh",
+    "A foam between the smooth surface through a closed mesh and its parallel surface.",
+    {"file": "Triangle mesh: PLY, OBJ, STL, OFF, GLB."},
+)
 
 
 @app.command()
@@ -241,28 +228,16 @@ def check(
         raise typer.Exit(NOT_CONVERGED)
 
 
-def _values(
-    surface: dict[str, Any],
-    n_bubbles: int,
-    gap: float,
-    seed: int,
-    seeds: str,
-    lloyd: int,
-    volumes: float | None,
-    order: int,
-    t1: bool,
-    color_by: str,
-    out: str,
-) -> dict[str, Any]:
+def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
-    foam = {"n_bubbles": n_bubbles, "seeds": seeds, "lloyd": lloyd}
+    foam = {name: given[name] for name in ("n_bubbles", "seeds", "lloyd")}
     return {
-        "seed": seed,
+        "seed": given["seed"],
         "surface": surface,
-        "cell": {"gap": gap},
-        "foam": foam if volumes is None else {**foam, "volumes": volumes},
-        "relax": {"order": order, "t1": t1},
-        "output": {"folder": out, "color_by": color_by},
+        "cell": {"gap": given["gap"]},
+        "foam": foam if given["volumes"] is None else {**foam, "volumes": given["volumes"]},
+        "relax": {"order": given["order"], "t1": given["t1"]},
+        "output": {"folder": given["out"], "color_by": given["color_by"]},
     }
 
 

@@ -12,21 +12,32 @@ from typing import Any, TypeVar
 
 from warpedfoam.arrays import as_choice, as_flag, as_floats, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
+from warpedfoam.cli.sizes import SIZES
 from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
-from warpedfoam.surfaces import Ellipsoid, MeshSurface, Sphere, Surface, Torus
+from warpedfoam.surfaces import (
+    Ellipsoid,
+    FlatTorus,
+    MeshSurface,
+    SchwarzP,
+    Sphere,
+    Surface,
+    Torus,
+)
 from warpedfoam.tessellate.build import SEED_KINDS
 
 Section = TypeVar("Section")
 DEFAULT_BUBBLES = 200
 
-#: Each kind of surface and the sizes that it has unless told otherwise.
-SURFACES: Mapping[str, tuple[Callable[..., Surface], Mapping[str, float | str]]] = {
-    "torus": (Torus, {"major_radius": 20.0, "minor_radius": 4.0}),
-    "sphere": (Sphere, {"radius": 10.0}),
-    "ellipsoid": (Ellipsoid, {"a": 10.0, "b": 12.0, "c": 15.0}),
-    "mesh": (lambda file: MeshSurface.from_file(file), {"file": ""}),
+#: What makes each kind of surface from its sizes.
+MAKERS: Mapping[str, Callable[..., Surface]] = {
+    "torus": Torus,
+    "sphere": Sphere,
+    "ellipsoid": Ellipsoid,
+    "flat_torus": FlatTorus,
+    "schwarz_p": SchwarzP,
+    "mesh": lambda file: MeshSurface.from_file(file),
 }
 
 
@@ -81,9 +92,8 @@ class SurfaceOptions:
     sizes: Mapping[str, float | str] = field(default_factory=dict)
 
     def build(self) -> Surface:
-        """Make the surface; sizes not given are those of `SURFACES`."""
-        make, defaults = SURFACES[self.kind]
-        return make(**{**defaults, **self.sizes})
+        """Make the surface; sizes not given are those of `SIZES`."""
+        return MAKERS[self.kind](**{**SIZES[self.kind], **self.sizes})
 
 
 @dataclass(frozen=True)
@@ -150,7 +160,7 @@ class Options:
     def as_mapping(self) -> dict[str, Any]:
         """The options as nested plain values, shaped like the TOML file, defaults filled in."""
         out = asdict(self)
-        out["surface"] = {"kind": self.surface.kind, **SURFACES[self.surface.kind][1], **self.surface.sizes}
+        out["surface"] = {"kind": self.surface.kind, **SIZES[self.surface.kind], **self.surface.sizes}
         out["foam"]["n_bubbles"] = self.n_bubbles
         return out
 
@@ -277,7 +287,7 @@ def _suggestion(name: str, known: list[str], table: bool) -> str:
 
 
 def _names(kind: str) -> list[str]:
-    names = ["seed", "surface.kind", *(f"surface.{name}" for name in SURFACES[kind][1])]
+    names = ["seed", "surface.kind", *(f"surface.{name}" for name in SIZES[kind])]
     for section, options in SECTIONS.items():
         names += [f"{section}.{f.name}" for f in fields(options)]
     return names
@@ -291,12 +301,12 @@ def _table(values: Mapping[str, Any], section: str, places: _Places) -> Mapping[
 
 
 def _surface(table: Mapping[str, Any], places: _Places) -> SurfaceOptions:
-    kind = places.read("surface.kind", table.get("kind", "torus"), _one_of(*SURFACES))
+    kind = places.read("surface.kind", table.get("kind", "torus"), _one_of(*SIZES))
     sizes = {}
     for name, value in table.items():
         if name != "kind":
             places.require_known(f"surface.{name}", _names(kind))
-            reader = _text if isinstance(SURFACES[kind][1][name], str) else _above_zero
+            reader = _text if isinstance(SIZES[kind][name], str) else _above_zero
             sizes[name] = places.read(f"surface.{name}", value, reader)
     if kind == "mesh" and "file" not in sizes:
         raise ValueError(f"{places.of('surface')}: surface.file is needed: the name of a mesh file")

@@ -10,7 +10,6 @@ import numpy as np
 from warpedfoam.arrays import Bools, Floats, Ints, as_instance, as_integer, as_number, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.io.remainder import remainder
-from warpedfoam.network import CellNetwork
 
 # Patches of more than this share of the surface get many rings: they bend a lot.
 _LARGE = 1.0 / 10.0
@@ -96,25 +95,47 @@ def film_points(foam: Foam, curve_points: int) -> FilmPoints:
     network = foam.network
     between = foam.film_curves(k)[:, 1:-1]
     places = network.n_vertices + np.arange(network.n_films * (k - 2)).reshape(network.n_films, k - 2)
-    chains = np.concatenate([network.tails[:, None], places, network.heads[:, None]], axis=1)
     points = np.concatenate([foam.vertex_points, between.reshape(-1, 3)])
+    heads = network.heads
+    if foam.cell.surface.period is not None:
+        images = foam.film_ends[1] - foam.vertex_points[heads]
+        points, heads = _with_images(points, heads, images, foam.bubble_size)
+    chains = np.concatenate([network.tails[:, None], places, heads[:, None]], axis=1)
     return FilmPoints(frozen(points), frozen(chains))
 
 
-def loop_points(network: CellNetwork, chains: Ints) -> tuple[Ints, Ints, Ints]:
+def _with_images(points: Floats, places: Ints, shifts: Floats, unit: float) -> tuple[Floats, Ints]:
+    """Points and places once those that are shifted are points of their own, each image once."""
+    moved = np.flatnonzero(np.abs(shifts).max(axis=1) > 0.01 * unit)
+    keys = np.column_stack([places[moved], np.round(shifts[moved] / (0.01 * unit)).astype(np.int64)])
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    out = places.copy()
+    out[moved] = len(points) + which.reshape(-1)
+    chosen = moved[first]
+    return np.concatenate([points, points[places[chosen]] + shifts[chosen]]), out
+
+
+def loop_points(foam: Foam, along: FilmPoints) -> tuple[Floats, Ints, Ints, Ints]:
     """Points along each boundary loop, counter-clockwise and none twice.
 
     Returns
     -------
-    points : (m,) array of int
-        Loop after loop, from `FilmPoints.chains`.
+    points : (n, 3) array
+        Those of ``along``, and images of them where a surface repeats in space and a loop goes on there.
+    places : (m,) array of int
+        Points of the loops, loop after loop.
     sizes, bubble : (n_loops,) arrays of int
         Points and bubble of each loop.
     """
+    network, chains = foam.network, along.chains
     loops = network.loops
     film, back = loops.halves >> 1, (loops.halves & 1).astype(bool)
     rows = np.where(back[:, None], chains[film, ::-1], chains[film])[:, :-1]
-    return rows.ravel(), loops.sizes * rows.shape[1], network.bubble[loops.halves[loops.starts]]
+    points, places = along.points, rows.ravel()
+    if foam.loop_shifts is not None:
+        shifts = np.repeat(foam.loop_shifts, rows.shape[1], axis=0)
+        points, places = _with_images(points, places, shifts, foam.bubble_size)
+    return points, places, loops.sizes * rows.shape[1], network.bubble[loops.halves[loops.starts]]
 
 
 def bubble_patches(foam: Foam, *, curve_points: int = 9, rings: int = 4, rim_width: float = 0.0) -> Patches:
@@ -147,8 +168,8 @@ def bubble_patches(foam: Foam, *, curve_points: int = 9, rings: int = 4, rim_wid
     n_rings = as_integer(rings, "rings", minimum=1)
     width = as_number(rim_width, "rim_width", minimum=0.0) * foam.bubble_size
     along = film_points(foam, curve_points)
-    places, sizes, bubble = loop_points(foam.network, along.chains)
-    every = _Outline(along.points[places], sizes, bubble)
+    points, places, sizes, bubble = loop_points(foam, along)
+    every = _Outline(points[places], sizes, bubble)
     disk = foam.network.bubble_euler[bubble] == 1
     large = foam.bubble_areas[bubble] > _LARGE * foam.cell.surface.area
     patches: list[Patches] = []

@@ -91,10 +91,9 @@ def write_ply(
 def _write_network(path: Path, foam: Foam, colours: BubbleColours, curve_points: int) -> None:
     network = foam.network
     along = film_points(foam, curve_points)
-    places, sizes, bubble = loop_points(network, along.chains)
+    points, places, sizes, bubble = loop_points(foam, along)
     disk = network.bubble_euler[bubble] == 1
     places, sizes, bubble = places[np.repeat(disk, sizes)], sizes[disk], bubble[disk]
-    points = along.points
     if (sizes > MOST_CORNERS).any():
         places, sizes, bubble, middles = _cut(places, sizes, bubble, len(points), points)
         points = np.concatenate([points, middles])

@@ -19,13 +19,20 @@ Landing = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 
 def fan_integrals(
-    rule: LobattoRule, points: Floats, loops: Loops, foot: Foot, land: Landing, n_radial: int
+    rule: LobattoRule,
+    points: Floats,
+    loops: Loops,
+    shifts: Floats | None,
+    foot: Foot,
+    land: Landing,
+    n_radial: int,
 ) -> Floats:
     """∫ w dA inside each loop, (n_loops,), from the nodes (K, F, 3) of its arcs.
 
     Rays run from a centre c to the arcs x(ξ) and down to the surface along the loop's own axis m, the
-    direction of its vector area ½ ∮ x × dx: dA = r m · ((x − c) × x') / (n · m) dr dξ. Gauss points:
-    ``n_radial`` on a ray, two more than the film's order along it (three where rays have two).
+    direction of its vector area ½ ∮ x × dx: dA = r m · ((x − c) × x') / (n · m) dr dξ.
+    ``shifts`` (m, 3) move the half-arcs of each loop together. Gauss points: ``n_radial`` on a ray, two
+    more than the film's order along it (three where rays have two).
     """
     xi, omega = gauss(rule.order + 2 if n_radial > 2 else 3)
     values = rule.interpolation(xi)
@@ -34,12 +41,17 @@ def fan_integrals(
     film, owner = loops.halves >> 1, np.repeat(np.arange(len(loops.starts)), loops.sizes)
     sign = np.where(loops.halves & 1, -1.0, 1.0)[:, None]
     length = np.linalg.norm(slope, axis=2)
-    weight = np.add.reduceat(length.sum(axis=0)[film], loops.starts)
-    centre = np.add.reduceat((length[..., None] * curve).sum(axis=0)[film], loops.starts) / weight[:, None]
+    span = length.sum(axis=0)[film]
+    weight = np.add.reduceat(span, loops.starts)
+    moment = (length[..., None] * curve).sum(axis=0)[film]
+    if shifts is not None:
+        moment += span[:, None] * shifts
+    centre = np.add.reduceat(moment, loops.starts) / weight[:, None]
     twist = np.cross(curve, slope).sum(axis=0)
     run = slope.sum(axis=0)
     # vector area about the loop's own centre, not the origin: far away loops keep their digits
-    turned = np.add.reduceat(sign * (twist[film] - np.cross(centre[owner], run[film])), loops.starts)
+    origin = centre[owner] if shifts is None else centre[owner] - shifts
+    turned = np.add.reduceat(sign * (twist[film] - np.cross(origin, run[film])), loops.starts)
     axis = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-300)
     centre = foot(centre, axis)
     normal, _ = land(centre, axis)
@@ -50,7 +62,7 @@ def fan_integrals(
         part = slice(lo, lo + CHUNK)
         own, arcs = owner[part], film[part]
         m, c = axis[own], centre[own]
-        arm = curve[:, arcs] - c
+        arm = curve[:, arcs] - (c if shifts is None else c - shifts[part])
         flux = dots(np.cross(arm, slope[:, arcs]), m) * sign[part, 0]
         # the parabola that starts in the centre's tangent plane and ends on the film is nearly there
         r = radii[:, None, None, None]

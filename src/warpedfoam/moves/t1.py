@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from warpedfoam.arrays import Bools, Floats, Ints, as_indices, as_number
 from warpedfoam.errors import TopologyError
 from warpedfoam.foam import Foam
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.network import CellNetwork
 from warpedfoam.surfaces.protocol import Surface
@@ -233,7 +234,7 @@ def lay_films(
 ) -> tuple[Floats, Floats]:
     """Points and offsets with each site's film laid along ``along`` (k, 3), about its middle."""
     tail, head = network.origin[sites.a], network.origin[sites.c]
-    middle = surface.project(0.5 * (points[tail] + points[head]))
+    middle = surface.project(points[tail] + 0.5 * nearest_image(points[head] - points[tail], surface.period))
     normal = surface.normals(middle)
     flat = along - np.einsum("ki,ki->k", along, normal)[:, None] * normal
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)

@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 # Above this many polygons a vector file holds the foam as an image, its text as text.
 _MOST_VECTORS = 20_000
+# Surfaces that are called after somebody.
+PROPER = {"SchwarzP": "Schwarz P surface"}
+# Backs keep this share of their colour, the rest is this grey.
+BACK_SHARE, BACK_GREY = 0.25, 0.62
 _FORMATS = (".png", ".svg", ".pdf")
 
 
@@ -167,6 +171,8 @@ def _resolution(n_bubbles: int) -> tuple[int, int]:
 
 
 def _default_view(foam: Foam, patches: Patches) -> tuple[float, float]:
+    if np.ptp(patches.points[:, 2]) <= 1e-9 * foam.cell.surface.size:
+        return 90.0, -90.0
     low_and_flat = np.argmin(np.ptp(patches.points, axis=0)) == 2
     return (48.0, -60.0) if low_and_flat and foam.cell.surface.euler_characteristic <= 0 else (25.0, -60.0)
 
@@ -180,19 +186,29 @@ def _paint(
     surface = foam.cell.surface
     corners = view.project(patches.points)[patches.triangles]
     normals = view.project(surface.normals(patches.points))[patches.triangles].mean(axis=1)
-    seen = facing(corners) > 0.0
-    corners, normals = corners[seen], normals[seen]
-    fill = colours.rgb[patches.triangle_bubble[seen]] / 255.0 * shades(normals)[:, None]
+    front = facing(corners) > 0.0
+    # of a surface with edges in the picture the back is seen too: paler, lit as if turned round
+    seen = front if surface.period is None else np.ones(len(corners), dtype=bool)
+    corners, normals, front = corners[seen], normals[seen], front[seen]
+    fill = colours.rgb[patches.triangle_bubble[seen]] / 255.0
+    fill = np.where(front[:, None], fill, BACK_SHARE * fill + (1.0 - BACK_SHARE) * BACK_GREY)
+    fill *= shades(np.where(front[:, None], normals, -normals))[:, None]
 
-    curves = foam.film_curves(segments + 1)
+    curves, film = foam.film_curves(segments + 1), np.arange(foam.network.n_films)
+    if foam.loop_shifts is not None:
+        # a bubble that reaches over the edge of the unit is drawn whole, with its own images of its films
+        film = foam.network.loops.halves >> 1
+        curves = curves[film] + foam.loop_shifts[:, None]
     middles = 0.5 * (curves[:, 1:] + curves[:, :-1]).reshape(-1, 3)
     towards = view.project(surface.normals(middles))[:, 2] > 0.0
+    if surface.period is not None:
+        towards[:] = True
     flat = view.project(curves)
     pieces = np.stack([flat[:, :-1], flat[:, 1:]], axis=2).reshape(-1, 2, 3)[towards]
     # each piece is painted after the triangles beside it: lifted by the depth that these span
     span = np.zeros(foam.n_bubbles)
     np.maximum.at(span, patches.triangle_bubble[seen], np.ptp(corners[:, :, 2], axis=1))
-    beside = np.maximum(span[foam.network.left], span[foam.network.right])
+    beside = np.maximum(span[foam.network.left], span[foam.network.right])[film]
     lift = np.repeat(beside, segments)[towards] + np.ptp(pieces[:, :, 2], axis=1)
     closed = np.concatenate([pieces, pieces[:, :1]], axis=1)
 
@@ -230,7 +246,8 @@ def _film_width(n_bubbles: int) -> float:
 
 
 def _heading(foam: Foam) -> str:
-    kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(foam.cell.surface).__name__).lower()
+    name = type(foam.cell.surface).__name__
+    kind = PROPER.get(name) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     article = "an" if kind[0] in "aeiou" else "a"
     count = int((foam.network.bubble_euler == 1).sum())
     return f"{count} bubble{'' if count == 1 else 's'} on {article} {kind} · energy {foam.energy:.6g}"

@@ -8,6 +8,7 @@ import numpy as np
 
 from warpedfoam.arrays import Bools, Floats, Ints
 from warpedfoam.cell import HeleShawCell
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.moves.t1 import (
     T1Event,
     T1Sites,
@@ -64,8 +65,9 @@ def plan_sweep(
     """
     network = state.network
     moved = cell.surface.retract(state.points, length * step.vertices)
-    old = state.points[network.heads] - state.points[network.tails]
-    new = moved[network.heads] - moved[network.tails]
+    period = cell.surface.period
+    old = nearest_image(state.points[network.heads] - state.points[network.tails], period)
+    new = nearest_image(moved[network.heads] - moved[network.tails], period)
     was = np.linalg.norm(old, axis=1) / length
     now = np.linalg.norm(new, axis=1) / length
     reversed_ = np.einsum("fi,fi->f", old, new) < 0.0
@@ -103,6 +105,7 @@ def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> 
     films, pull = sweep.failing[staying], sweep.current[staying]
     network = state.network
     chord = state.points[network.tails[films]] - state.points[network.heads[films]]
+    chord = nearest_image(chord, cell.surface.period)
     span = np.linalg.norm(chord, axis=1)
     least = 0.5 * SHORT * length * sweep.scale[films]
     lost = (np.einsum("ki,ki->k", chord, pull) < 0.0) | (span < least)
@@ -131,13 +134,15 @@ def turned(
     sites = t1_sites(network, films)
     five = np.concatenate([films[:, None], sites.outer >> 1], axis=1)
     before = _energies(cell, state, five)
-    chord = np.linalg.norm(state.points[network.tails[films]] - state.points[network.heads[films]], axis=1)
+    ends = state.points[network.tails[films]] - state.points[network.heads[films]]
+    chord = np.linalg.norm(nearest_image(ends, cell.surface.period), axis=1)
     unit = length * sweep.scale[films]
     span = np.maximum(NEW_LENGTH[0] * unit, np.minimum(chord, NEW_LENGTH[1] * unit))
     points, offsets = lay_films(cell.surface, network, state.points, state.offsets, sites, sweep.along, span)
     after_state = State(rewire(network, films), points, offsets, state.pressures)
     after = _energies(cell, after_state, five)
-    middle = cell.surface.project(0.5 * (points[network.origin[sites.a]] + points[network.origin[sites.c]]))
+    start, end = points[network.origin[sites.a]], points[network.origin[sites.c]]
+    middle = cell.surface.project(start + 0.5 * nearest_image(end - start, cell.surface.period))
     ids = bubble_ids[sites.bubbles].tolist()
     columns = zip(
         films.tolist(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from os import PathLike
 from pathlib import Path
@@ -14,13 +15,16 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 #: Kinds of files by their endings, and those that write each triangle's corners anew.
 KINDS = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 SOUPS = (".stl", ".obj", ".glb", ".gltf")
+#: Bytes in which a header must end for its counts to be looked at.
+HEAD = 65536
 
 
 def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
     """Triangle mesh of a PLY, OBJ, STL, OFF, GLB or GLTF file.
 
     Quadrilaterals are cut in two. Formats that repeat a triangle's corners (STL, textured OBJ and
-    GLB) have corners of exactly equal position merged. Nothing else is changed or mended.
+    GLB) have corners of exactly equal position merged; nodes keep the order in which they first appear.
+    Nothing else is changed or mended.
 
     Parameters
     ----------
@@ -33,7 +37,9 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
     FileNotFoundError
         If there is no such file.
     MeshError
-        If the file is of an unknown kind, damaged, or holds no triangles.
+        If the file is of an unknown kind, damaged, cut short, or holds no triangles.
+    OSError
+        If it cannot be opened.
     """
     if not isinstance(path, (str, PathLike)):
         raise TypeError(f"path must be a file name, got {type(path).__name__}")
@@ -45,6 +51,10 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
         raise MeshError(f"cannot read {file}: it is not a file")
     if kind not in KINDS:
         raise MeshError(f"cannot read {file}: meshes come as {', '.join(KINDS)}, not as {kind or 'nothing'}")
+    if not file.stat().st_size:
+        raise MeshError(f"cannot read {file}: it is empty")
+    with file.open("rb") as stream:  # an OSError speaks for itself
+        head = stream.read(HEAD)
     import trimesh
 
     try:
@@ -53,13 +63,41 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
             found = trimesh.load_mesh(file, process=False, maintain_order=True)
         nodes, triangles = np.asarray(found.vertices), np.asarray(found.faces)
     except Exception as fault:  # whatever a damaged file makes the readers raise
-        raise MeshError(f"cannot read {file}: it is damaged or no mesh ({fault!r:.200})") from None
+        said = ascii(f"{type(fault).__name__}: {str(fault):.200}" if str(fault) else type(fault).__name__)[
+            1:-1
+        ]
+        raise MeshError(
+            f"cannot read {file}: it is damaged or cut short, or no {kind[1:].upper()} mesh ({said:.200})"
+        ) from None
+    promised = _promised(kind, head)
+    if promised and (promised[0] > len(nodes) or promised[1] > len(triangles)):
+        raise MeshError(
+            f"cannot read {file}: it promises {promised[0]} nodes and {promised[1]} faces but holds "
+            f"{len(nodes)} and {len(triangles)}: it is damaged or was cut short"
+        )
     if not len(triangles):
         raise MeshError(f"cannot read {file}: it holds {len(nodes)} points but no triangles")
     if kind in SOUPS and np.isfinite(nodes).all():
-        nodes, place = np.unique(nodes, axis=0, return_inverse=True)
-        triangles = place.reshape(-1)[triangles]
+        # + 0.0: the two zeros are one place
+        _, first, place = np.unique(nodes + 0.0, axis=0, return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        nodes = nodes[first[order]]
+        triangles = np.argsort(order)[place.reshape(-1)][triangles]
     try:
         return TriangleMesh(nodes, triangles)
     except (TypeError, ValueError) as fault:
         raise MeshError(f"cannot read {file}: {fault}") from None
+
+
+def _promised(kind: str, head: bytes) -> tuple[int, int] | None:
+    """Numbers of nodes and faces in the header; the readers of text take files that were cut short."""
+    if kind == ".ply":
+        head = head.partition(b"end_header")[0]
+        counts = [re.search(rb"element\s+%s\s+(\d+)" % name, head) for name in (b"vertex", b"face")]
+        if counts[0] and counts[1]:
+            return int(counts[0][1]), int(counts[1][1])
+    if kind == ".off":
+        found = re.match(rb"\s*OFF\s+(\d+)\s+(\d+)\s", re.sub(rb"#[^\n]*", b"", head))
+        if found:
+            return int(found[1]), int(found[2])
+    return None

@@ -11,12 +11,15 @@ from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_instance, as_integer, as_number
 from warpedfoam.errors import MeshError
-from warpedfoam.surfaces.mesh import TriangleMesh
-from warpedfoam.surfaces.mesh_surface import MeshSurface
+from warpedfoam.surfaces.mesh import TriangleMesh, flat_triangles
+from warpedfoam.surfaces.mesh_surface import MeshSurface, placement_fault
+from warpedfoam.surfaces.protocol import SIZES
 
 #: Nodes nearer than this share of the mesh's size coincide; angles below it are slivers (degrees);
 #: neighbouring triangles that turn by more are a crease (degrees); edges a bubble should span.
 COINCIDENT, SLIVER, CREASE, EDGES = 1e-9, 5.0, 60.0, 3.0
+#: What the command line's repair takes care of.
+MENDED, FILLED = "(--repair does)", "(--repair does those of 3 or 4 edges)"
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class MeshReport:
     findings : tuple of MeshFinding
     n_nodes, n_triangles, components, rims, euler_characteristic : int
     area, mean_edge, least_angle : float
-        Of the flat triangles; the angle in degrees.
+        Of the flat triangles; the angle in degrees. NaN if the mesh is out of scale.
     curvature_range : tuple of two float or None
         Of the smooth surface, if the mesh makes one.
     """
@@ -88,56 +91,62 @@ def mesh_report(mesh: TriangleMesh, *, gap: float | None = None, n_bubbles: int 
     >>> report.sound, report.rims, report.findings[0].fault
     (False, 1, 'open edges')
     """
-    as_instance(mesh, "mesh", TriangleMesh)
-    d = None if gap is None else as_number(gap, "gap", positive=True)
+    _as_file_mesh(mesh)
+    d = None if gap is None else as_number(gap, "gap", positive=True, maximum=SIZES["maximum"])
     count = None if n_bubbles is None else as_integer(n_bubbles, "n_bubbles", minimum=1)
     found: list[MeshFinding] = []
 
     def add(fault: str, bad: Bools | Ints, kind: str, advice: str, *, fatal: bool = True) -> None:
         places = np.flatnonzero(bad) if bad.dtype == bool else bad
         if len(places):
-            found.append(MeshFinding(fault, len(places), f"{kind} {int(places[0])}", advice, fatal))
+            first = int(places[0])
+            point = mesh.nodes[mesh.triangles[first] if kind == "triangle" else [first]].mean(axis=0)
+            where = f"{kind} {first} at ({', '.join(f'{x:.4g}' for x in point)})"
+            found.append(MeshFinding(fault, len(places), where, advice, fatal))
 
     tri, n = mesh.triangles, mesh.n_nodes
+    misplaced = placement_fault(mesh)
+    if misplaced is not None:
+        found.append(MeshFinding("out of scale or place", 1, "everywhere", misplaced, True))
     used = np.zeros(n, dtype=np.bool_)
     used[tri] = True
-    add("nodes without triangles", ~used, "node", "remove them")
+    add("nodes without triangles", ~used, "node", f"remove them {MENDED}")
     twice = (tri == np.roll(tri, 1, axis=1)).any(axis=1)
-    add("triangles that use a node twice", twice, "triangle", "remove them")
-    size = float(np.ptp(mesh.nodes, axis=0).max())
-    pairs = cKDTree(mesh.nodes).query_pairs(COINCIDENT * size, output_type="ndarray")
-    add("nodes at the same place", np.unique(pairs[:, 1]), "node", "merge them", fatal=False)
-    _, first, tally = np.unique(np.sort(tri, axis=1), axis=0, return_index=True, return_counts=True)
-    add("triangles that occur twice", first[tally > 1], "triangle", "keep one of each")
-    angle = _least_angles(mesh)
-    add("triangles without area", ~twice & ~(angle > 1e-6), "triangle", "collapse them")
-    thin = (angle > 1e-6) & (angle < SLIVER)
-    add(f"slivers (an angle below {SLIVER:g} degrees)", thin, "triangle", "remesh more evenly", fatal=False)
+    add("triangles that use a node twice", twice, "triangle", f"remove them {MENDED}")
     edges = _Edges(mesh)
-    add("edges with more than two triangles", edges.crowded, "edge at node", "split or remove extra sheets")
-    add("triangles turned against a neighbour", edges.flipped, "edge at node", "turn them round")
-    add("open edges", edges.open_, "edge at node", "close the holes: rims are not supported yet")
+    angle = np.array([np.nan])
+    if misplaced is None:
+        shared = _coincident(mesh)
+        advice = f"merge them where they belong together {MENDED}" if len(edges.rim) else "harmless"
+        add("nodes at the same place", shared, "node", advice, fatal=False)
+        angle = _least_angles(mesh)
+        flat = flat_triangles(mesh)
+        add("triangles without area", ~twice & flat, "triangle", "collapse their shortest edges or remesh")
+        thin = ~twice & ~flat & (angle < SLIVER)
+        add(f"slivers (an angle below {SLIVER:g} degrees)", thin, "triangle", "remesh evenly", fatal=False)
+    _, first, tally = np.unique(np.sort(tri, axis=1), axis=0, return_index=True, return_counts=True)
+    add("triangles that occur twice", first[tally > 1], "triangle", f"keep one of each {MENDED}")
+    add("edges with more than two triangles", edges.crowded, "edge at node", "remove the extra sheets")
+    add("triangles turned against a neighbour", edges.flipped, "edge at node", f"turn them round {MENDED}")
+    add("open edges", edges.open_, "edge at node", f"close the holes {FILLED}: foams need a closed surface")
     pieces, piece = connected_components(edges.graph, directed=False)
     pieces -= int((~used).sum())
     if pieces > 1:
         sizes = np.bincount(piece)
-        found.append(
-            MeshFinding("separate components", pieces, f"largest of {sizes.max()} nodes", "keep one", True)
-        )
+        where = f"sizes up to {sizes.max()} nodes"
+        found.append(MeshFinding("separate components", pieces, where, f"keep one {MENDED}", True))
     if not any(finding.fatal for finding in found):
         found += _pinched(mesh)
     rims = _rim_count(edges.rim, n)
     curvatures = None
     if not any(finding.fatal for finding in found):
         found += _closed_findings(mesh)
-        curvatures = MeshSurface(mesh.nodes, mesh.triangles).curvature_range()
-        if d is not None and 1.0 + d * curvatures[0] <= 0.0:
-            advice = f"take a gap below {-1.0 / curvatures[0]:.3g}, or smooth the mesh"
-            found.append(MeshFinding(f"plates fold at gap {d:g}", 1, "the tightest hollow", advice, True))
-        if count is not None and np.sqrt(mesh.area / count) < EDGES * mesh.mean_edge:
-            enough = int(np.ceil(EDGES**2 / 0.86 * count))
-            advice = f"about {enough} nodes show the shape between bubbles (refined by itself)"
-            found.append(MeshFinding(f"coarse for {count} bubbles", 1, "everywhere", advice, False))
+        try:
+            curvatures = MeshSurface(mesh.nodes, mesh.triangles).curvature_range()
+        except MeshError as fault:
+            found.append(MeshFinding("no smooth surface", 1, "the nodes named", str(fault), True))
+        else:
+            found += _size_findings(mesh, curvatures, d, count)
     return MeshReport(
         tuple(found),
         n,
@@ -145,19 +154,19 @@ def mesh_report(mesh: TriangleMesh, *, gap: float | None = None, n_bubbles: int 
         int(pieces),
         rims,
         mesh.euler_characteristic,
-        mesh.area,
-        mesh.mean_edge,
+        mesh.area if misplaced is None else np.nan,
+        mesh.mean_edge if misplaced is None else np.nan,
         float(angle.min()),
         curvatures,
     )
 
 
 def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
-    """The mesh after safe repairs by trimesh, and what was done; shape is not changed.
+    """The mesh after safe repairs, and what was done; shape is not changed.
 
-    Merges nodes at the same place, drops doubled and flat triangles and unused nodes, keeps the
-    largest component, turns triangles the same way round and outwards, and closes holes of three or
-    four edges.
+    Merges nodes at the same place (on rims, or joined by an edge), drops doubled triangles, those that
+    use a node twice and unused nodes, keeps the largest component, turns triangles the same way round
+    and outwards, and closes holes of three or four edges. What needs judgement is left alone.
 
     Raises
     ------
@@ -174,43 +183,86 @@ def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     """
     import trimesh
 
-    as_instance(mesh, "mesh", TriangleMesh)
-    work, done = mesh.to_trimesh(), []
+    _as_file_mesh(mesh)
+    if placement_fault(mesh) is not None:
+        return mesh, ()
+    done: list[str] = []
 
     def note(text: str, count: int) -> None:
         if count:
             done.append(f"{text.format(count)}{'' if count == 1 else 's'}")
 
-    before = len(work.vertices)
-    work.merge_vertices()
-    note("merged {} node", before - len(work.vertices))
-    before = len(work.faces)
-    work.update_faces(work.nondegenerate_faces())
-    work.update_faces(work.unique_faces())
-    note("dropped {} triangle", before - len(work.faces))
-    if not len(work.faces):
+    # not trimesh's merging and dropping: their tolerances are lengths, whatever the size of the mesh
+    place, merged = _merging(mesh)
+    note("merged {} node", merged)
+    tri = place[mesh.triangles]
+    proper = ~(tri == np.roll(tri, 1, axis=1)).any(axis=1)
+    tri = tri[proper]
+    if not len(tri):
         raise MeshError("nothing is left of the mesh: all its triangles are flat")
+    tri = tri[np.sort(np.unique(np.sort(tri, axis=1), axis=0, return_index=True)[1])]
+    note("dropped {} triangle", mesh.n_triangles - len(tri))
+    unused = mesh.n_nodes - merged - len(np.unique(tri))
+    work = trimesh.Trimesh(mesh.nodes.copy(), tri, process=False)
     parts = trimesh.graph.connected_components(work.face_adjacency, nodes=np.arange(len(work.faces)))
     if len(parts) > 1:
         keep = np.zeros(len(work.faces), dtype=np.bool_)
         keep[max(parts, key=len)] = True
         work.update_faces(keep)
         note("dropped {} component", len(parts) - 1)
-    before = len(work.vertices)
     work.remove_unreferenced_vertices()
-    note("dropped {} unused node", before - len(work.vertices))
+    note("dropped {} unused node", unused)
     old = np.array(work.faces)
     trimesh.repair.fix_winding(work)  # type: ignore[no-untyped-call]
-    note("turned {} triangle", _turned(old, np.asarray(work.faces)))
+    turned = _turned(old, np.asarray(work.faces))
+    if 2 * turned > len(old):  # it follows the first triangle, we the most
+        work.faces = np.asarray(work.faces)[:, ::-1]
+        turned = _turned(old, np.asarray(work.faces))
+    note("turned {} triangle", turned)
     holes = _rim_count(_Edges(TriangleMesh.from_trimesh(work)).rim, len(work.vertices))
     if holes:
         work.fill_holes()
         left = _rim_count(_Edges(TriangleMesh.from_trimesh(work)).rim, len(work.vertices))
         note("closed {} hole", holes - left)
-    if work.is_watertight and work.volume < 0.0:
-        work.invert()
+    out = TriangleMesh.from_trimesh(work)
+    if not len(_Edges(out).rim) and _signed_volume(out) < 0.0:
+        out = TriangleMesh(out.nodes, out.triangles[:, ::-1])
         done.append("turned the mesh outwards")
-    return TriangleMesh.from_trimesh(work), tuple(done)
+    return out, tuple(done)
+
+
+def _as_file_mesh(mesh: TriangleMesh) -> None:
+    if as_instance(mesh, "mesh", TriangleMesh).period is not None:
+        raise MeshError("mesh repeats in space; meshes of files and their surfaces do not")
+
+
+def _coincident(mesh: TriangleMesh) -> Bools:
+    """Nodes that share their place with another."""
+    reach = COINCIDENT * float(np.ptp(mesh.nodes, axis=0).max())
+    apart = np.asarray(cKDTree(mesh.nodes).query(mesh.nodes, k=2, distance_upper_bound=2.0 * reach)[0])
+    out: Bools = apart[:, 1] <= reach
+    return out
+
+
+def _merging(mesh: TriangleMesh) -> tuple[Ints, int]:
+    """The node that takes each node's place, and how many give theirs up.
+
+    Only nodes on rims merge, and those joined by an edge: sheets that touch are left apart.
+    """
+    n = mesh.n_nodes
+    edges = _Edges(mesh)
+    reach = COINCIDENT * float(np.ptp(mesh.nodes, axis=0).max())
+    short = mesh.edges[mesh.edge_lengths <= reach]
+    rim = np.unique(edges.rim)
+    # exactly equal ones first, lest thousands in one place make millions of pairs
+    _, which, place = np.unique(mesh.nodes[rim], axis=0, return_index=True, return_inverse=True)
+    equal = np.stack([rim, rim[which[place.reshape(-1)]]], axis=1)
+    close = rim[which[cKDTree(mesh.nodes[rim[which]]).query_pairs(reach, output_type="ndarray")]]
+    a, b = np.concatenate([short, equal, close]).T
+    pieces, piece = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
+    first = np.full(pieces, n)
+    np.minimum.at(first, piece, np.arange(n))
+    return first[piece], n - int(pieces)
 
 
 class _Edges:
@@ -252,13 +304,45 @@ def _pinched(mesh: TriangleMesh) -> list[MeshFinding]:
     return []
 
 
+def _signed_volume(mesh: TriangleMesh) -> float:
+    """Volume inside a closed mesh, below 0 if it is inside out."""
+    a, b, c = (mesh.nodes[mesh.triangles[:, i]] - mesh.nodes.mean(axis=0) for i in range(3))
+    return float(np.einsum("nx,nx->", a, np.cross(b, c))) / 6.0
+
+
+def _size_findings(
+    mesh: TriangleMesh, curvatures: tuple[float, float], gap: float | None, count: int | None
+) -> list[MeshFinding]:
+    """Whether the plates fold, and whether the mesh is fine enough for the gap and the bubbles."""
+    out = []
+    hollow = -curvatures[0]
+    # the rule of HeleShawCell, which will be asked next
+    if gap is not None and 1.0 - gap * hollow <= 1e-12:
+        advice = f"take a gap below {1.0 / hollow:.3g}, or smooth the mesh"
+        out.append(MeshFinding(f"plates fold at gap {gap:g}", 1, "the tightest hollow", advice, True))
+    elif gap is not None and gap * hollow > 0.3 and hollow * mesh.mean_edge > 0.3:
+        advice = (
+            f"the least radius of curvature, {1.0 / hollow:.3g}, is known from few nodes: a finer mesh tells "
+            "whether the plates fold"
+        )
+        out.append(MeshFinding(f"coarse for gap {gap:g}", 1, "the tightest hollow", advice, False))
+    if count is not None and np.sqrt(mesh.area / count) < EDGES * mesh.mean_edge:
+        enough = int(np.ceil(EDGES**2 / 0.86 * count))
+        advice = (
+            f"from about {enough} nodes on, each bubble sees the shape of the surface; a coarser mesh is "
+            "smoothed between its nodes, which may be good enough"
+        )
+        out.append(MeshFinding(f"coarse for {count} bubbles", 1, "everywhere", advice, False))
+    return out
+
+
 def _closed_findings(mesh: TriangleMesh) -> list[MeshFinding]:
     """What may be wrong with a proper closed mesh: inside out, or creased."""
     out = []
-    a, b, c = (mesh.nodes[mesh.triangles[:, i]] for i in range(3))
-    if np.einsum("nx,nx->", a, np.cross(b, c)) < 0.0:
-        advice = "the gap lies inside; turn all triangles round if it should lie outside"
+    if _signed_volume(mesh) < 0.0:
+        advice = f"the gap lies inside; if it should lie outside, turn all triangles round {MENDED}"
         out.append(MeshFinding("inside out", 1, "everywhere", advice, False))
+    a, b, c = (mesh.nodes[mesh.triangles[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     n = mesh.n_nodes

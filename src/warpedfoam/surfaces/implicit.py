@@ -7,22 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
 
-from warpedfoam.arrays import Floats, as_floats, as_integer, frozen
-from warpedfoam.errors import MeshError
-from warpedfoam.kernels.nets import surface_net
-from warpedfoam.surfaces.level import LevelSurface
-from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.arrays import Floats, as_floats, frozen
+from warpedfoam.surfaces.netted import FIRST_LOOK, NettedSurface
 
-#: Grid points of the first look, nodes of a net per area in squared grid steps, smoothing rounds.
-FIRST_LOOK, PER_CELL, ROUNDS = 40, 1.5, 30
 #: Step of second derivatives by differences, and largest error of the user's gradient; in sizes, relative.
 STEP, GRADIENT_ERROR = 1e-5, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Implicit(LevelSurface):
+class Implicit(NettedSurface):
     """Closed surface f = 0 inside a box, from f and its gradient; f grows into the gap.
 
     Parameters
@@ -81,12 +75,12 @@ class Implicit(LevelSurface):
         put(self, "gradient", gradient)
         put(self, "hessian", hessian)
         put(self, "bounds", frozen(box))
-        nodes, _ = self._net(float((box[1] - box[0]).max()) / FIRST_LOOK)
+        nodes, _ = self.net(float((box[1] - box[0]).max()) / FIRST_LOOK)
         self._check_gradient(nodes)
 
     def _check_gradient(self, points: Floats) -> None:
         h = STEP * self.size
-        slopes = [(self._f(points + h * e) - self._f(points - h * e)) / (2.0 * h) for e in np.eye(3)]
+        slopes = [(self.values(points + h * e) - self.values(points - h * e)) / (2.0 * h) for e in np.eye(3)]
         given = self._g(points)
         fault = np.abs(np.stack(slopes, axis=1) - given).max(axis=1)
         if not (fault <= GRADIENT_ERROR * np.linalg.norm(given, axis=1).max()).all():
@@ -97,7 +91,8 @@ class Implicit(LevelSurface):
                 f"{given[bad].round(4).tolist()}, differences of function give {found}"
             )
 
-    def _f(self, points: Floats) -> Floats:
+    def values(self, points: Floats) -> Floats:
+        """The user's function."""
         return as_floats(self.function(points), "function's values", (len(points),))
 
     def _g(self, points: Floats) -> Floats:
@@ -118,7 +113,7 @@ class Implicit(LevelSurface):
         safe = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, self.bounds[0])
         if not len(points):
             return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)) if second else None
-        value, slope = self._f(safe), self._g(safe)
+        value, slope = self.values(safe), self._g(safe)
         if not second:
             return value, slope, None
         if self.hessian is not None:
@@ -128,42 +123,7 @@ class Implicit(LevelSurface):
         bend = np.stack(rows, axis=1)
         return value, slope, 0.5 * (bend + bend.transpose(0, 2, 1))
 
-    def triangulate(self, n_nodes: int) -> TriangleMesh:
-        """A surface net on a grid of the right step, evened out and moved to the surface."""
-        count = as_integer(n_nodes, "n_nodes", minimum=50)
-        known: dict[int, TriangleMesh] = self.__dict__.setdefault("_meshes", {})
-        if count not in known:
-            span = self.bounds[1] - self.bounds[0]
-            step = float(span.max()) / FIRST_LOOK
-            nodes, _ = self._net(step)
-            for _ in range(2):
-                step = max(step * np.sqrt(len(nodes) / count), float(span.max()) / 1000.0)
-                nodes, triangles = self._net(step)
-            known[count] = self._evened(nodes, triangles)
-        return known[count]
-
-    def _net(self, step: float) -> tuple[Floats, np.ndarray]:
-        low, high = self.bounds
-        cells = np.maximum(np.ceil((high - low) / step).astype(int), 4)
-        axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        values = self._f(grid.reshape(-1, 3)).reshape(grid.shape[:3])
-        if not (values < 0.0).any() or not (values > 0.0).any():
-            raise MeshError("function does not change sign inside bounds: there is no surface to mesh")
-        walls = [np.moveaxis(values, axis, 0)[[0, -1]] for axis in range(3)]
-        if len({bool(s) for wall in walls for s in np.unique(wall < 0.0)}) > 1:
-            raise MeshError("the surface reaches the walls of bounds; choose a larger box")
-        nodes, triangles = surface_net(values)
-        return low + nodes * (high - low) / cells, triangles
-
-    def _evened(self, nodes: Floats, triangles: np.ndarray) -> TriangleMesh:
-        mesh = TriangleMesh(nodes, triangles)
-        mesh.require_closed_surface()
-        a, b = mesh.edges.T
-        n = mesh.n_nodes
-        graph = coo_array((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
-        degree: Floats = np.asarray(graph.sum(axis=1))[:, None]
-        x = self.project(nodes)
-        for _ in range(ROUNDS):
-            x = self.foot(x + 0.5 * (np.asarray(graph @ x) / degree - x), self._unit(x))
-        return TriangleMesh(frozen(x), triangles)
+    @property
+    def box(self) -> Floats:
+        """The bounds."""
+        return self.bounds

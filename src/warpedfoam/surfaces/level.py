@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Floats, Ints, as_generator, as_integer, as_points, frozen
 from warpedfoam.errors import MeshError
@@ -15,13 +14,18 @@ from warpedfoam.kernels import height_arcs as arcs
 from warpedfoam.kernels.fans import fan_integrals
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.nodal import bump_offsets
+from warpedfoam.kernels.periodic import loop_shifts, nearest_image
 from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.kernels.thinning import accepted
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.patches import PatchedMesh
+from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import ArcTerms, Layer
 
-#: Newton steps along a line to the surface, steps to the nearest point, rounds of the even lattice.
-LINE_STEPS, NEAREST_STEPS, LATTICE_ROUNDS = 12, 200, 40
+#: Newton steps along a line to the surface, steps to the nearest point.
+LINE_STEPS, NEAREST_STEPS = 12, 200
+#: Rounds of the even lattice.
+LATTICE_ROUNDS = 40
 
 
 class LevelSurface(ABC):
@@ -54,6 +58,11 @@ class LevelSurface(ABC):
     @abstractmethod
     def euler_characteristic(self) -> int:
         """χ."""
+
+    @property
+    def period(self) -> Floats | None:
+        """It does not repeat."""
+        return None
 
     @property
     def precision(self) -> float:
@@ -210,12 +219,13 @@ class LevelSurface(ABC):
         """Centres of even cells: Lloyd's method on fixed pseudo-random points."""
         n = as_integer(count, "count", minimum=1)
         crowd = self._patches.random_points(40 * n, np.random.default_rng(0))
-        centres = crowd[:n]
+        centres = crowd[_spread_out(crowd[: 10 * n], n, float(np.sqrt(self.area / n)), self.period)]
         for _ in range(LATTICE_ROUNDS):
-            _, owner = cKDTree(centres).query(crowd, workers=-1)
+            _, owner = Places(centres, self.period).nearest(crowd)
             size = np.bincount(owner, minlength=n)
-            sums = np.stack([np.bincount(owner, crowd[:, k], n) for k in range(3)], axis=1)
-            centres = np.where(size[:, None] > 0, sums / np.maximum(size, 1)[:, None], centres)
+            away = nearest_image(crowd - centres[owner], self.period)
+            sums = np.stack([np.bincount(owner, away[:, k], n) for k in range(3)], axis=1)
+            centres = centres + sums / np.maximum(size, 1)[:, None]
         return self.project(centres)
 
     def vertex_frames(self, points: Floats) -> Floats:
@@ -239,18 +249,23 @@ class LevelSurface(ABC):
         """Combinations (k, 6) of the six generators that are tangent everywhere, and the centre."""
         points, weights = self._patches.quadrature()
         centre = weights @ points / weights.sum()
-        spread = _generators(points - centre, self.size)
+        # what repeats in space cannot turn
+        spread = _generators(points - centre, self.size)[: 6 if self.period is None else 3]
         across = np.einsum("anx,nx->an", spread, self._unit(points))
         tangent = (across * weights) @ across.T
         whole = np.einsum("n,anx,bnx->ab", weights, spread, spread)
         root = np.linalg.inv(np.linalg.cholesky(whole))
         values, vectors = np.linalg.eigh(root @ tangent @ root.T)
-        return frozen((root.T @ vectors[:, values < self.symmetry]).T), frozen(centre)
+        found = np.zeros((int((values < self.symmetry).sum()), 6))
+        found[:, : len(spread)] = (root.T @ vectors[:, values < self.symmetry]).T
+        return frozen(found), frozen(centre)
 
     # --- arcs -------------------------------------------------------------------------------------
 
     def _arcs(self, tail: Floats, head: Floats, offsets: Floats) -> arcs.HeightArcs:
         rule = lobatto(offsets.shape[1] + 1)
+        if self.period is not None:
+            head = tail + nearest_image(head - tail, self.period)
         return arcs.place(rule, tail, head, (self._unit(tail), self._unit(head)), offsets, self.foot)
 
     def arc_measure(self, tail: Floats, head: Floats, offsets: Floats, layer: Layer) -> Floats:
@@ -302,7 +317,7 @@ class LevelSurface(ABC):
         placed = self._arcs(tail, head, np.zeros((len(tail), 1)))
         square = arcs.dots(placed.left, placed.left)
         along = np.cross(placed.left, placed.axis)
-        ahead = points - tail[arc]
+        ahead = nearest_image(points - tail[arc], self.period)
         xi = arcs.dots(ahead, along[arc]) / square[arc]
         lift = arcs.dots(ahead, placed.left[arc]) / square[arc]
         return bump_offsets(arc, xi, lift, len(tail), order)
@@ -322,7 +337,10 @@ class LevelSurface(ABC):
             mean, gauss = _mean_gauss(shape)
             return normal, c0 + c1 * mean + c2 * gauss
 
-        return fan_integrals(placed.rule, placed.points, loops, self.foot, land, layer.rays)
+        back = (loops.halves & 1).astype(bool)[:, None]
+        first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]
+        shifts = loop_shifts(np.where(back, last, first), np.where(back, first, last), loops, self.period)
+        return fan_integrals(placed.rule, placed.points, loops, shifts, self.foot, land, layer.rays)
 
 
 def _normal_shape(gradient: Floats, second: Floats | None) -> tuple[Floats, Floats | None]:
@@ -342,6 +360,16 @@ def _mean_gauss(shape: Floats) -> tuple[Floats, Floats]:
     trace = np.einsum("...xx->...", shape)
     square = np.einsum("...xy,...xy->...", shape, shape)
     return 0.5 * trace, 0.5 * (trace**2 - square)
+
+
+def _spread_out(points: Floats, count: int, spacing: float, period: Floats | None) -> Ints:
+    """The first ``count`` of points thinned to the widest gaps that leave so many."""
+    places = Places(points, period)
+    for share in (0.8, 0.75, 0.7, 0.65, 0.6, 0.5):
+        chosen = np.flatnonzero(accepted(len(points), places.pairs(share * spacing).T))
+        if len(chosen) >= count:
+            return chosen[:count]
+    return np.arange(count)
 
 
 def _frames(normals: Floats) -> Floats:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpedfoam.arrays import Floats, Ints, as_indices, as_points, frozen
+from warpedfoam.arrays import Bools, Floats, Ints, as_indices, as_points, frozen
 from warpedfoam.errors import MeshError
+from warpedfoam.kernels.periodic import nearest_image
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,6 +26,9 @@ class TriangleMesh:
     nodes : (n, 3) array
     triangles : (m, 3) integer array
         Counter-clockwise seen from outside.
+    period : (3,) array, optional
+        Lengths after which the mesh repeats along x, y, z (infinite where it does not): its edges join
+        nearest images.
 
     Raises
     ------
@@ -40,15 +44,17 @@ class TriangleMesh:
 
     nodes: Floats
     triangles: Ints
+    period: Floats | None = None
     _checked: bool = field(default=False, repr=False)
 
-    def __init__(self, nodes: ArrayLike, triangles: ArrayLike) -> None:
+    def __init__(self, nodes: ArrayLike, triangles: ArrayLike, period: Floats | None = None) -> None:
         points = as_points(nodes, "nodes", minimum=3)
         faces = as_indices(triangles, "triangles", (None, 3), below=len(points))
         if not len(faces):
             raise MeshError("triangles is empty: a mesh needs at least one triangle")
         object.__setattr__(self, "nodes", frozen(points))
         object.__setattr__(self, "triangles", frozen(faces))
+        object.__setattr__(self, "period", None if period is None else frozen(np.asarray(period, float)))
 
     @property
     def n_nodes(self) -> int:
@@ -71,18 +77,26 @@ class TriangleMesh:
     @cached_property
     def edge_lengths(self) -> Floats:
         """Length of each edge, (n_edges,)."""
-        ends = self.nodes[self.edges]
-        return frozen(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        a, b = self.nodes[self.edges.T]
+        return frozen(np.linalg.norm(nearest_image(b - a, self.period), axis=1))
 
     @property
     def mean_edge(self) -> float:
         """Mean edge length h."""
         return float(self.edge_lengths.mean())
 
+    @property
+    def corners(self) -> Floats:
+        """Corners of each triangle, (m, 3, 3), images next to its first."""
+        found = self.nodes[self.triangles]
+        if self.period is not None:
+            found = found[:, :1] + nearest_image(found - found[:, :1], self.period)
+        return found
+
     @cached_property
     def triangle_areas(self) -> Floats:
         """Area of each triangle, (n_triangles,)."""
-        a, b, c = (self.nodes[self.triangles[:, i]] for i in range(3))
+        a, b, c = self.corners.transpose(1, 0, 2)
         return frozen(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
     @property
@@ -133,6 +147,13 @@ class TriangleMesh:
         return cls(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
+def flat_triangles(mesh: TriangleMesh) -> Bools:
+    """Which triangles have no area, as their longest edges go."""
+    longest = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2).max(axis=1)
+    flat: Bools = mesh.triangle_areas <= 1e-10 * longest**2
+    return flat
+
+
 def _check_closed(mesh: TriangleMesh) -> None:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -144,8 +165,7 @@ def _check_closed(mesh: TriangleMesh) -> None:
     same = (tri == np.roll(tri, 1, axis=1)).any(axis=1)
     if same.any():
         raise MeshError(f"triangle {int(np.flatnonzero(same)[0])} uses a node twice; remove such triangles")
-    longest = np.linalg.norm(mesh.nodes[tri] - mesh.nodes[np.roll(tri, 1, axis=1)], axis=2).max(axis=1)
-    flat = mesh.triangle_areas <= 1e-10 * longest**2
+    flat = flat_triangles(mesh)
     if flat.any():
         raise MeshError(
             f"{int(flat.sum())} triangles have no area (first: triangle {int(np.flatnonzero(flat)[0])}); "
@@ -165,7 +185,7 @@ def _check_closed(mesh: TriangleMesh) -> None:
         bad = int(directed[counts > 1][0])
         raise MeshError(
             f"the two triangles at edge ({bad // n}, {bad % n}) are oriented against each other; "
-            "flip one (trimesh.repair.fix_winding does)"
+            "flip one (warpedfoam check MESH --repair NEW.ply does)"
         )
     if (uses == 1).any():
         bad = int(undirected[uses == 1][0])

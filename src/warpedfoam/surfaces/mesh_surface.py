@@ -13,10 +13,12 @@ from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Floats, Ints, as_integer, frozen
+from warpedfoam.errors import MeshError
 from warpedfoam.kernels.jets import Jets, blended, fit_jets
 from warpedfoam.surfaces.files import read_mesh
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.protocol import SIZES
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,6 +27,10 @@ if TYPE_CHECKING:
 REACH, COVER, RINGS, MOST = 1.5, 0.75, 3, 48
 #: Sheets whose normals differ by more than this cosine do not blend.
 SAME_SHEET = 0.2
+#: Farthest from the origin, in extents of the mesh: beyond it round-off shows in the forces. Largest
+#: error of the total curvature, in units of 2π: with more the patches do not make up one surface.
+FARTHEST, TOTAL_CURVATURE = 1e3, 0.1
+SMOOTHER = "the mesh is too rough, too coarse or crosses itself there: smooth, refine or remesh it"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,7 +50,8 @@ class MeshSurface(LevelSurface):
     Raises
     ------
     TypeError, ValueError, MeshError
-        If the arrays are no closed, connected, consistently oriented manifold of proper triangles.
+        If the arrays are no closed, connected, consistently oriented manifold of proper triangles, or
+        too rough or coarse to pass a smooth surface through.
 
     Notes
     -----
@@ -66,10 +73,14 @@ class MeshSurface(LevelSurface):
 
     def __init__(self, nodes: ArrayLike, triangles: ArrayLike) -> None:
         mesh = TriangleMesh(nodes, triangles)
+        fault = placement_fault(mesh)
+        if fault:
+            raise MeshError(fault)
         mesh.require_closed_surface()
         object.__setattr__(self, "nodes", mesh.nodes)
         object.__setattr__(self, "triangles", mesh.triangles)
         self.__dict__["source"] = mesh
+        self._require_smooth()
 
     @cached_property
     def source(self) -> TriangleMesh:
@@ -78,6 +89,37 @@ class MeshSurface(LevelSurface):
 
     def __repr__(self) -> str:
         return f"MeshSurface({self.source.n_nodes} nodes, {self.source.n_triangles} triangles)"
+
+    def _require_smooth(self) -> None:
+        """Look at the surface where integrals will; nothing is done twice, the results are kept.
+
+        Raises
+        ------
+        MeshError
+            If the surface has gaps, or its total curvature is not 2πχ.
+        """
+        with np.errstate(all="ignore"):
+            try:
+                points, weights = self._patches.quadrature()
+                total = self._moments[2] / (2.0 * np.pi)
+            except np.linalg.LinAlgError:
+                raise MeshError(f"no smooth surface passes through the mesh; {SMOOTHER}") from None
+        torn = ~(np.isfinite(points).all(axis=1) & np.isfinite(weights))
+        if torn.any():
+            fine = self.triangulate(self.integral_nodes)
+            first = int(np.flatnonzero(torn)[0]) * fine.n_triangles // len(weights)
+            raise MeshError(self._torn(fine.nodes[fine.triangles[first, 0]]))
+        if not abs(total - self.euler_characteristic) < TOTAL_CURVATURE:
+            raise MeshError(
+                "no smooth surface passes through the mesh: the total curvature would be "
+                f"{total:.4g} x 2 pi, not {self.euler_characteristic} x 2 pi; {SMOOTHER}"
+            )
+
+    def _torn(self, start: Floats) -> str:
+        """Where the surface is missing, given a point from which it was not found."""
+        node = int(cKDTree(self.source.nodes).query(start)[1])
+        x, y, z = self.source.nodes[node]
+        return f"no smooth surface passes near node {node} at ({x:.4g}, {y:.4g}, {z:.4g}); {SMOOTHER}"
 
     @classmethod
     def from_trimesh(cls, mesh: trimesh.Trimesh) -> MeshSurface:
@@ -134,15 +176,37 @@ class MeshSurface(LevelSurface):
         known: dict[int, TriangleMesh] = self.__dict__.setdefault("_meshes", {})
         if halvings not in known:
             if halvings == 0:
-                nodes = self.foot(self.source.nodes.copy(), max_normals(self.source))
+                start = self.source.nodes.copy()
+                nodes = self.foot(start, max_normals(self.source))
                 triangles = self.source.triangles
             else:
                 coarse = self._refined(halvings - 1)
                 points, triangles = _halved(coarse)
-                new = points[coarse.n_nodes :]
+                new = start = points[coarse.n_nodes :]
                 nodes = np.concatenate([coarse.nodes, self.foot(new, self._unit(new))])
+            lost = np.flatnonzero(~np.isfinite(nodes[-len(start) :]).all(axis=1))
+            if lost.size:
+                raise MeshError(self._torn(start[lost[0]]))
             known[halvings] = TriangleMesh(frozen(nodes), triangles)
         return known[halvings]
+
+
+def placement_fault(mesh: TriangleMesh) -> str | None:
+    """What is wrong with the size or the place of a mesh, if anything: numbers that lose their digits."""
+    extent = float(np.ptp(mesh.nodes / 2.0, axis=0).max()) * 2.0
+    farthest = float(np.abs(mesh.nodes).max())
+    # the maximum in two ways: an extent may overflow
+    if not SIZES["minimum"] <= extent <= SIZES["maximum"]:
+        return (
+            f"the mesh is {extent:.3g} across, which is outside {SIZES['minimum']:g} … {SIZES['maximum']:g}; "
+            "take other units of length, or mend the nodes that stray"
+        )
+    if farthest > FARTHEST * extent:
+        return (
+            f"the mesh is {farthest:.3g} from the origin but only {extent:.3g} across, which costs digits; "
+            "move it to the origin"
+        )
+    return None
 
 
 def max_normals(mesh: TriangleMesh) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpedfoam.arrays import Floats, Ints
 from warpedfoam.kernels.height_arcs import Foot, dots
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
 
 #: Rules on a triangle (Dunavant 1985): degree 6 with 12 points, degree 4 with 6, as barycentric triples
@@ -52,7 +53,7 @@ class PatchedMesh:
 
     def _lifted(self, triangles: Ints, shares: Floats) -> tuple[Floats, Floats]:
         """Points (n, 3) of triangles at barycentric ``shares`` (n, 3), and dA over the unit triangle."""
-        corners, normals = self._mesh.nodes[triangles], self._normals[triangles]
+        corners, normals = self._corners(triangles), self._normals[triangles]
         flat = np.einsum("ni,nix->nx", shares, corners)
         axes = np.einsum("ni,nix->nx", shares, normals)
         points = self._foot(flat, axes)
@@ -64,6 +65,10 @@ class PatchedMesh:
             move = corners[:, i] - corners[:, 0] + height[:, None] * (normals[:, i] - normals[:, 0])
             sides.append(move - (dots(move, n) / slope)[:, None] * axes)
         return points, 0.5 * dots(np.cross(sides[0], sides[1]), n)
+
+    def _corners(self, triangles: Ints) -> Floats:
+        corners = self._mesh.nodes[triangles]
+        return corners[:, :1] + nearest_image(corners - corners[:, :1], self._mesh.period)
 
     def quadrature(self) -> tuple[Floats, Floats]:
         """Points of the surface and their weights, which add up to its area."""

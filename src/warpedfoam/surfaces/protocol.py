@@ -95,6 +95,11 @@ class Surface(Protocol):
         ...
 
     @property
+    def period(self) -> Floats | None:
+        """Lengths (3,) after which the surface repeats along x, y, z, infinite where it does not; or None."""
+        ...
+
+    @property
     def precision(self) -> float:
         """Relative error that loop integrals may show on a sound foam: round-off, or that of quadrature."""
         ...

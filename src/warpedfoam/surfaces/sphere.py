@@ -64,6 +64,11 @@ class Sphere:
         return 2
 
     @property
+    def period(self) -> Floats | None:
+        """It does not repeat."""
+        return None
+
+    @property
     def precision(self) -> float:
         """Loop integrals are exact."""
         return 1e-6

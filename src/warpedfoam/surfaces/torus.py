@@ -80,6 +80,11 @@ class Torus:
         return 0
 
     @property
+    def period(self) -> Floats | None:
+        """It does not repeat."""
+        return None
+
+    @property
     def precision(self) -> float:
         """Loop integrals are exact."""
         return 1e-6

@@ -20,7 +20,9 @@ from warpedfoam.arrays import (
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ResolutionError
 from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import Layer
 from warpedfoam.tessellate.fields import SeedFields, seed_fields
 from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR, HeatGeodesics
@@ -194,7 +196,7 @@ def _laid_out(
     to = np.broadcast_to(labels[corner][:, None, :], (len(corner), 3, 3))
     squares, known = field.square_to(at, to)
     place = corner_weights(squares, np.all(known, axis=(1, 2)))
-    vertices = surface.project(np.einsum("mi,mix->mx", place, mesh.nodes[corner]))
+    vertices = surface.project(np.einsum("mi,mix->mx", place, mesh.corners[regions.corners]))
     a, b = regions.crossings.T
     ends = np.stack([labels[a], labels[b]], axis=1)
     at_a, known_a = field.square_to(np.stack([a, a], axis=1), ends)
@@ -204,10 +206,11 @@ def _laid_out(
     total = gap_a + gap_b
     sound = known_a.all(axis=1) & known_b.all(axis=1) & (total > 0.0)
     share = np.where(sound, np.clip(gap_a / np.where(sound, total, 1.0), 0.0, 1.0), 0.5)
-    crossings = surface.project(mesh.nodes[a] + share[:, None] * (mesh.nodes[b] - mesh.nodes[a]))
+    edge = nearest_image(mesh.nodes[b] - mesh.nodes[a], mesh.period)
+    crossings = surface.project(mesh.nodes[a] + share[:, None] * edge)
     tail, head = vertices[network.tails], vertices[network.heads]
     offsets = surface.arc_fit(tail, head, regions.film, crossings, order)
-    chord = np.linalg.norm(head - tail, axis=1)
+    chord = np.linalg.norm(nearest_image(head - tail, surface.period), axis=1)
     short = chord < 0.3 * float(np.sqrt(surface.area / network.n_bubbles))
     offsets[short] = 0.0
     covered = bubble_integrals(cell, network, vertices, offsets, Layer.surface()).sum()
@@ -273,17 +276,16 @@ def _target_volumes(
 
 def _nearest_nodes(mesh: TriangleMesh, points: Floats) -> Ints:
     """The four nodes nearest to each point, (n, 4)."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(mesh.nodes).query(points, k=4)[1], dtype=np.int64)
+    return Places(mesh.nodes, mesh.period).nearest(points, 4)[1]
 
 
 def _centres(cell: HeleShawCell, mesh: TriangleMesh, labels: Ints, points: Floats) -> Floats:
     """Area-weighted mean of each region's nodes, on the surface; an empty region keeps its seed."""
     count = len(points)
     total = np.bincount(labels, mesh.node_areas, minlength=count)
-    sums = [np.bincount(labels, mesh.node_areas * mesh.nodes[:, k], minlength=count) for k in range(3)]
-    mean = np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
+    away = nearest_image(mesh.nodes - points[labels], mesh.period) * mesh.node_areas[:, None]
+    sums = [np.bincount(labels, away[:, k], minlength=count) for k in range(3)]
+    mean = points + np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
     return cell.surface.project(np.where((total > 0.0)[:, None], mean, points))
 
 

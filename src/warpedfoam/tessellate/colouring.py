@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
-from warpedfoam.arrays import Ints, as_number, as_points
+from warpedfoam.arrays import Floats, Ints, as_number, as_points
+from warpedfoam.surfaces.places import Places
 
 Words = NDArray[np.uint64]
 
 _PASSES = 12  # recolouring passes after the first colouring
 
 
-def colour_seeds(points: ArrayLike, radius: float) -> Ints:
+def colour_seeds(points: ArrayLike, radius: float, period: Floats | None = None) -> Ints:
     """Colours 0, 1, … such that points of equal colour are more than ``radius`` apart.
 
     The graph of pairs within the radius is coloured greedily, nodes of many neighbours first, all
@@ -28,6 +28,8 @@ def colour_seeds(points: ArrayLike, radius: float) -> Ints:
     points : (n, 3) array
     radius : float
         Above 0; straight distances.
+    period : (3,) array, optional
+        Lengths after which space repeats.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def colour_seeds(points: ArrayLike, radius: float) -> Ints:
     """
     x = as_points(points, "points")
     reach = as_number(radius, "radius", positive=True)
-    pairs = cKDTree(x).query_pairs(reach, output_type="ndarray").astype(np.int64)
+    pairs = Places(x, period).pairs(reach)
     both = np.concatenate([pairs, pairs[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
     starts = np.searchsorted(both[:, 0], np.arange(len(x) + 1))

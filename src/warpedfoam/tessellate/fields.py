@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Bools, Floats, Ints
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.places import Places
 from warpedfoam.tessellate.colouring import colour_seeds
 from warpedfoam.tessellate.geodesics import HeatGeodesics
 
@@ -64,18 +65,18 @@ def seed_fields(
     """
     nodes = heat.mesh.nodes
     count = min(CANDIDATES, len(seeds))
-    chord, near = cKDTree(seeds).query(nodes, k=count, workers=-1)
+    period = heat.mesh.period
+    chord, near = Places(seeds, period).nearest(nodes, count)
     chord, near = np.reshape(chord, (len(nodes), count)), np.reshape(near, (len(nodes), count))
-    _, source = cKDTree(nodes).query(seeds)
-    source = np.asarray(source, dtype=np.int64)
-    colours = colour_seeds(seeds, APART * spacing)
+    _, source = Places(nodes, period).nearest(seeds)
+    colours = colour_seeds(seeds, APART * spacing, period)
     # seeds that share a source node must not share a solve: they do not, being close together
     order = np.argsort(colours[near.ravel()], kind="stable")
     n_colours = int(colours.max()) + 1
     bounds = np.searchsorted(colours[near.ravel()][order], np.arange(n_colours + 1))
     by_colour = np.argsort(colours, kind="stable")
     first = np.searchsorted(colours[by_colour], np.arange(n_colours + 1))
-    shift = nodes[:, None, :] - nodes[source[near]]
+    shift = nearest_image(nodes[:, None, :] - nodes[source[near]], period)
     straight = np.einsum("nki,nki->nk", shift, shift)
     least = (np.sqrt(straight) - heat.mesh.mean_edge).ravel()
     squares = np.empty(near.size)

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Floats, Ints, as_indices, as_number, as_points, frozen
 from warpedfoam.errors import ConvergenceError, MeshError
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.places import Places
+from warpedfoam.tessellate.intrinsic_heat import IntrinsicHeat
 
 if TYPE_CHECKING:
     import trimesh
@@ -134,7 +136,11 @@ class HeatGeodesics:
         import igl
 
         nodes = _source_nodes(sources, self._mesh.n_nodes)
-        out: Floats = np.asarray(igl.heat_geodesics_solve(self._data, nodes), dtype=np.float64)
+        if isinstance(self._data, IntrinsicHeat):
+            found = self._data.solve(nodes)
+        else:
+            found = igl.heat_geodesics_solve(self._data, nodes)
+        out: Floats = np.asarray(found, dtype=np.float64)
         if out.shape != (self._mesh.n_nodes,) or not np.isfinite(out).all():
             raise ConvergenceError(f"the heat method gave distances that are not finite; {self._advice()}")
         return out
@@ -143,7 +149,7 @@ class HeatGeodesics:
         """Refuse a t whose distances are shorter than straight lines by more than a fifth and 2 edges."""
         nodes = self._mesh.nodes
         source = int(((nodes - nodes[0]) ** 2).sum(axis=1).argmax())
-        straight = np.linalg.norm(nodes - nodes[source], axis=1)
+        straight = np.linalg.norm(nearest_image(nodes - nodes[source], self._mesh.period), axis=1)
         short = 0.8 * straight - 2.0 * self._mesh.edge_lengths.max() - self.distances(source)
         if short[worst := int(short.argmax())] > 0.0:
             raise ConvergenceError(
@@ -202,7 +208,7 @@ def geodesic_distances(
         return best
     points = as_points(array, "sources")
     corners, shares = _affine(heat.mesh, points)
-    lifts = ((heat.mesh.nodes[corners] - points[:, None]) ** 2).sum(axis=2)
+    lifts = (nearest_image(heat.mesh.nodes[corners] - points[:, None], heat.mesh.period) ** 2).sum(axis=2)
     for nodes, share, lift in zip(corners, shares, lifts, strict=True):
         squares = np.stack([heat.distances(node) for node in nodes]) ** 2
         np.minimum(best, share @ (squares - lift[:, None]), out=best)
@@ -267,6 +273,8 @@ def _factor(mesh: TriangleMesh, t: float) -> Any:
     The Laplacian is singular, and libigl relies on round-off to keep its last pivot from 0. A cube's
     or a regular tetrahedron's is exactly 0, so a second try moves the nodes by 1e-12 edges.
     """
+    if mesh.period is not None:
+        return IntrinsicHeat(mesh, t)
     import igl
 
     nudge = 1e-12 * mesh.mean_edge * np.random.default_rng(0).uniform(-1.0, 1.0, mesh.nodes.shape)
@@ -302,8 +310,7 @@ def _source_nodes(sources: ArrayLike, n_nodes: int) -> Ints:
 
 def _affine(mesh: TriangleMesh, points: Floats) -> tuple[Ints, Floats]:
     """Corners (k, 3) of a triangle at each point's nearest node, and the affine coordinates (k, 3)."""
-    found = cKDTree(mesh.nodes).query(points)
-    offset, node = np.asarray(found[0]), np.asarray(found[1])
+    offset, node = Places(mesh.nodes, mesh.period).nearest(points)
     if (far := offset > mesh.edge_lengths.max()).any():
         bad = int(np.flatnonzero(far)[0])
         raise ValueError(
@@ -316,10 +323,10 @@ def _affine(mesh: TriangleMesh, points: Floats) -> tuple[Ints, Floats]:
     which = np.repeat(np.arange(len(points)), count)
     place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
     triangle = corner[first[node][which] + place] // 3
-    a, b, c = (mesh.nodes[mesh.triangles[triangle, i]] for i in range(3))
+    a, b, c = mesh.corners[triangle].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     scale = (normal**2).sum(axis=1)
-    x = points[which] - a
+    x = nearest_image(points[which] - a, mesh.period)
     beta = (np.cross(x, c - a) * normal).sum(axis=1) / scale
     gamma = (np.cross(b - a, x) * normal).sum(axis=1) / scale
     shares = np.stack([1.0 - beta - gamma, beta, gamma], axis=1)

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from warpedfoam.arrays import Bools, Floats, Ints
 from warpedfoam.errors import ResolutionError
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.network import CellNetwork
 from warpedfoam.surfaces.mesh import TriangleMesh
 
@@ -71,7 +72,8 @@ def opened_rings(mesh: TriangleMesh, labels: Ints, seeds: Floats) -> Ints:
     for ring in rings:
         beside = pairs[(pairs == ring).any(axis=1)].sum(axis=1) - ring
         for inner in beside[degree[beside] == 1]:
-            side = mesh.nodes @ (seeds[inner] - seeds[ring])
+            across = nearest_image(seeds[inner] - seeds[ring], mesh.period)
+            side = nearest_image(mesh.nodes - seeds[ring], mesh.period) @ across
             labels[(labels == ring) & (side >= side[labels == inner].min())] = inner
     return labels
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_generator, as_integer, as_points
+from warpedfoam.kernels.periodic import nearest_image
+from warpedfoam.kernels.thinning import accepted
+from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import Surface
 
 _DARTS = 8  # candidates per blue-noise seed
@@ -78,10 +80,10 @@ def blue_noise_seeds(surface: Surface, n: int, rng: object) -> Floats:
     count, generator = as_integer(n, "n", minimum=1), as_generator(rng, "rng")
     darts: Floats = surface.random_points(_DARTS * count, generator)
     spacing = float(np.sqrt(surface.area / count))
-    pairs, lengths = _close_pairs(darts, _WIDEST * spacing)
+    pairs, lengths = _close_pairs(darts, _WIDEST * spacing, surface.period)
 
     def thinned(radius: float) -> Bools:
-        return _accepted(len(darts), pairs[:, lengths < radius])
+        return accepted(len(darts), pairs[:, lengths < radius])
 
     low, high = 0.72 * spacing, _WIDEST * spacing
     while np.count_nonzero(chosen := thinned(low)) < count:
@@ -118,31 +120,14 @@ def check_seeds(surface: Surface, points: ArrayLike) -> Floats:
             f"seeds must lie on the surface, but seed {worst} is {off[worst]:.3g} off it; "
             "project them with surface.project(seeds)"
         )
-    same = cKDTree(seeds).query_pairs(1e-9 * surface.size, output_type="ndarray")
+    same = Places(seeds, surface.period).pairs(1e-9 * surface.size)
     if len(same):
         first, second = sorted(int(i) for i in same[np.lexsort(same.T[::-1])[0]])
         raise ValueError(f"seeds must be distinct, but seeds {first} and {second} coincide; remove one")
     return seeds
 
 
-def _close_pairs(points: Floats, radius: float) -> tuple[Ints, Floats]:
+def _close_pairs(points: Floats, radius: float, period: Floats | None) -> tuple[Ints, Floats]:
     """Pairs i < j nearer than the radius, (2, m), and their distances."""
-    pairs = cKDTree(points).query_pairs(radius, output_type="ndarray").T
-    pairs = np.sort(pairs, axis=0).astype(np.int64)
-    return pairs, np.linalg.norm(points[pairs[0]] - points[pairs[1]], axis=1)
-
-
-def _accepted(n: int, pairs: Ints) -> Bools:
-    """The independent set that takes nodes in order, each unless a taken one is its partner."""
-    taken = np.zeros(n, dtype=np.bool_)
-    open_ = np.ones(n, dtype=np.bool_)
-    first, second = pairs
-    while open_.any():
-        free = open_.copy()
-        free[second] = False  # an earlier partner is still open
-        taken |= free
-        open_ &= ~free
-        open_[second[free[first]]] = False
-        left = open_[first] & open_[second]
-        first, second = first[left], second[left]
-    return taken
+    pairs = Places(points, period).pairs(radius).T
+    return pairs, np.linalg.norm(nearest_image(points[pairs[0]] - points[pairs[1]], period), axis=1)

@@ -1,0 +1,39 @@
+"""Search trees over points of surfaces that may repeat in space."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warpedfoam.arrays import Floats, Ints
+
+
+class Places:
+    """A k-d tree whose straight distances are those to nearest images."""
+
+    def __init__(self, points: Floats, period: Floats | None) -> None:
+        self._period = period
+        box = None if period is None else np.where(np.isfinite(period), period, 0.0)
+        self._tree = cKDTree(self._inside(points), boxsize=box)
+
+    def _inside(self, points: Floats) -> Floats:
+        """Points moved into the box from 0 to the period."""
+        if self._period is None:
+            return points
+        finite = np.isfinite(self._period)
+        unit = np.where(finite, self._period, 1.0)
+        share = points / unit
+        share = np.where(finite, share - np.floor(share), share)
+        # a hair below 0 is rounded up to 1, which is outside
+        return np.where(finite & (share >= 1.0), 0.0, share) * unit
+
+    def nearest(self, points: Floats, count: int = 1) -> tuple[Floats, Ints]:
+        """Distances and indices of the ``count`` nearest, (n, count); one dimension less if it is 1."""
+        found = self._tree.query(self._inside(points), k=count, workers=-1)
+        return np.asarray(found[0]), np.asarray(found[1], dtype=np.int64)
+
+    def pairs(self, radius: float) -> Ints:
+        """Pairs i < j within ``radius``, (m, 2)."""
+        pairs = self._tree.query_pairs(radius, output_type="ndarray")
+        out: Ints = np.sort(pairs, axis=1).astype(np.int64)
+        return out
