@@ -172,7 +172,7 @@ def test_lattice_points_are_even(member):
     gaps = np.linalg.norm(nearest_image(points[:, None] - points, member.surface.period), axis=2)
     np.fill_diagonal(gaps, np.inf)
     spacing = np.sqrt(member.surface.area / 150)
-    assert gaps.min() > 0.6 * spacing
+    assert gaps.min() > 0.5 * spacing
     assert gaps.min(axis=1).max() < 1.3 * spacing
 
 
