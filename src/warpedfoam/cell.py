@@ -53,7 +53,7 @@ class HeleShawCell:
         gap = as_number(self.gap, "gap", positive=True, maximum=SIZES["maximum"])
         least, _ = self.surface.curvature_range()
         # plates that touch to round-off have folded: 1 + 49 · (−1/49) need not be 0
-        if 1.0 + gap * least <= 1e-12:
+        if not 1.0 + gap * least > 1e-12:
             raise ValueError(
                 f"gap {gap:g} folds the outer plate: it must be less than {-1.0 / least:g}, "
                 "the least radius of curvature on the side of the gap"

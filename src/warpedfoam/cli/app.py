@@ -53,6 +53,9 @@ Count = Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of bubbles
 Gap = Annotated[float, typer.Option("--gap", help="Distance between the plates.")]
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
 Seeds = Annotated[str, typer.Option("--seeds", help="Where bubbles start: random, blue or lattice.")]
+Cells = Annotated[
+    str, typer.Option("--cells", help="Start from voronoi cells, or power cells of the right volumes.")
+]
 Lloyd = Annotated[int, typer.Option("--lloyd", help="Sweeps that even out the bubbles before relaxing.")]
 Volumes = Annotated[
     float | None,
@@ -165,6 +168,7 @@ SHARED: Mapping[str, tuple[Any, Any]] = {
     "gap": (Gap, 0.5),
     "seed": (Seed, 0),
     "seeds": (Seeds, "random"),
+    "cells": (Cells, "voronoi"),
     "lloyd": (Lloyd, 0),
     "volumes": (Volumes, None),
     "order": (Order, 4),
@@ -230,7 +234,7 @@ def check(
 
 def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
-    foam = {name: given[name] for name in ("n_bubbles", "seeds", "lloyd")}
+    foam = {name: given[name] for name in ("n_bubbles", "seeds", "cells", "lloyd")}
     return {
         "seed": given["seed"],
         "surface": surface,

@@ -88,7 +88,8 @@ def _described(name: str, report: MeshReport) -> str:
         lines.append(f"curvature {low:.4g} to {high:.4g} on the smooth surface; {room}")
     for finding in report.findings:
         kind = "FAULT" if finding.fatal else "note"
-        lines.append(f"{kind:<9} {finding.fault} ({finding.count}; first: {finding.where}): {finding.advice}")
+        place = f"{finding.count}; first: {finding.where}" if finding.count > 1 else finding.where
+        lines.append(f"{kind:<9} {finding.fault} ({place}): {finding.advice}")
     lines.append(f"verdict   {'can carry a foam' if report.sound else 'cannot carry a foam'}")
     return "\n".join(lines)
 

@@ -25,7 +25,7 @@ from warpedfoam.surfaces import (
     Surface,
     Torus,
 )
-from warpedfoam.tessellate.build import SEED_KINDS
+from warpedfoam.tessellate.build import CELL_KINDS, SEED_KINDS
 
 Section = TypeVar("Section")
 DEFAULT_BUBBLES = 200
@@ -109,6 +109,7 @@ class FoamOptions:
 
     n_bubbles: int | None = field(default=None, metadata=read_by(_at_least(1)))
     seeds: Any = field(default="random", metadata=read_by(_seeds))
+    cells: str = field(default="voronoi", metadata=read_by(_one_of(*CELL_KINDS)))
     lloyd: int = field(default=0, metadata=read_by(_at_least(0)))
     volumes: Any = field(default=None, metadata=read_by(_volumes))
     n_nodes: int | None = field(default=None, metadata=read_by(_at_least(1)))

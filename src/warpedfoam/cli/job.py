@@ -80,6 +80,7 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
         options.n_bubbles,
         seeds=chosen.seeds if isinstance(chosen.seeds, str) else np.asarray(chosen.seeds),
         seed=options.seed,
+        cells=chosen.cells,
         lloyd=chosen.lloyd,
         volumes=np.asarray(chosen.volumes) if isinstance(chosen.volumes, list) else chosen.volumes,
         n_nodes=chosen.n_nodes,

@@ -66,7 +66,11 @@ def fit_jets(points: Floats, normals: Floats, spacing: Floats, reach: Floats, ne
         for _ in range(ROUNDS):
             frame = frames_of(normal)
             u, v, z = np.moveaxis(np.einsum("nix,nkx->nki", frame, away) / h[..., None], 2, 0)
-            rows = np.stack([u**i * v**j for i, j in POWERS], axis=2)
+            rows = np.empty((*u.shape, len(POWERS)))
+            rows[..., 0] = 1.0
+            for k, (i, j) in enumerate(POWERS[1:], start=1):
+                # one more factor on a monomial that is there already
+                rows[..., k] = rows[..., POWERS.index((i - 1, j) if i else (i, j - 1))] * (u if i else v)
             left = np.matmul((weight[..., None] * rows).transpose(0, 2, 1), rows)
             right = np.einsum("nk,nki,nk->ni", weight, rows, z)
             size = np.einsum("nii->n", left)

@@ -63,9 +63,7 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
             found = trimesh.load_mesh(file, process=False, maintain_order=True)
         nodes, triangles = np.asarray(found.vertices), np.asarray(found.faces)
     except Exception as fault:  # whatever a damaged file makes the readers raise
-        said = ascii(f"{type(fault).__name__}: {str(fault):.200}" if str(fault) else type(fault).__name__)[
-            1:-1
-        ]
+        said = ascii(f"{type(fault).__name__}: {fault!s:.200}" if str(fault) else type(fault).__name__)[1:-1]
         raise MeshError(
             f"cannot read {file}: it is damaged or cut short, or no {kind[1:].upper()} mesh ({said:.200})"
         ) from None
@@ -76,7 +74,10 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
             f"{len(nodes)} and {len(triangles)}: it is damaged or was cut short"
         )
     if not len(triangles):
-        raise MeshError(f"cannot read {file}: it holds {len(nodes)} points but no triangles")
+        raise MeshError(
+            f"cannot read {file}: it holds {len(nodes)} points but no triangles; "
+            + ("save its faces too" if len(nodes) else f"it is damaged, or no {kind[1:].upper()} mesh")
+        )
     if kind in SOUPS and np.isfinite(nodes).all():
         # + 0.0: the two zeros are one place
         _, first, place = np.unique(nodes + 0.0, axis=0, return_index=True, return_inverse=True)

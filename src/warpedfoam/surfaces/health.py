@@ -18,6 +18,8 @@ from warpedfoam.surfaces.protocol import SIZES
 #: Nodes nearer than this share of the mesh's size coincide; angles below it are slivers (degrees);
 #: neighbouring triangles that turn by more are a crease (degrees); edges a bubble should span.
 COINCIDENT, SLIVER, CREASE, EDGES = 1e-9, 5.0, 60.0, 3.0
+#: Shares of a hollow's radius from which on a gap is wide, and edges are too long to know the radius well.
+HOLLOW = 0.3
 #: What the command line's repair takes care of.
 MENDED, FILLED = "(--repair does)", "(--repair does those of 3 or 4 edges)"
 
@@ -203,14 +205,16 @@ def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     tri = tri[np.sort(np.unique(np.sort(tri, axis=1), axis=0, return_index=True)[1])]
     note("dropped {} triangle", mesh.n_triangles - len(tri))
     unused = mesh.n_nodes - merged - len(np.unique(tri))
-    work = trimesh.Trimesh(mesh.nodes.copy(), tri, process=False)
+    # of unit size for trimesh, whose tolerances are lengths; no node is moved, so the places stay ours
+    shrunk = mesh.nodes / np.abs(mesh.nodes).max()
+    work = trimesh.Trimesh(shrunk, tri, process=False)
     parts = trimesh.graph.connected_components(work.face_adjacency, nodes=np.arange(len(work.faces)))
     if len(parts) > 1:
         keep = np.zeros(len(work.faces), dtype=np.bool_)
         keep[max(parts, key=len)] = True
         work.update_faces(keep)
         note("dropped {} component", len(parts) - 1)
-    work.remove_unreferenced_vertices()
+        done[-1] += f" ({100.0 * (1.0 - keep.mean()):.3g} % of the triangles)"
     note("dropped {} unused node", unused)
     old = np.array(work.faces)
     trimesh.repair.fix_winding(work)  # type: ignore[no-untyped-call]
@@ -224,7 +228,8 @@ def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
         work.fill_holes()
         left = _rim_count(_Edges(TriangleMesh.from_trimesh(work)).rim, len(work.vertices))
         note("closed {} hole", holes - left)
-    out = TriangleMesh.from_trimesh(work)
+    kept, tri = np.unique(np.asarray(work.faces), return_inverse=True)
+    out = TriangleMesh(mesh.nodes[kept], tri.reshape(-1, 3))
     if not len(_Edges(out).rim) and _signed_volume(out) < 0.0:
         out = TriangleMesh(out.nodes, out.triangles[:, ::-1])
         done.append("turned the mesh outwards")
@@ -316,14 +321,16 @@ def _size_findings(
     """Whether the plates fold, and whether the mesh is fine enough for the gap and the bubbles."""
     out = []
     hollow = -curvatures[0]
+    vague = hollow * mesh.mean_edge > HOLLOW
     # the rule of HeleShawCell, which will be asked next
     if gap is not None and 1.0 - gap * hollow <= 1e-12:
         advice = f"take a gap below {1.0 / hollow:.3g}, or smooth the mesh"
+        advice += "; it is coarse there, a finer one may allow more" if vague else ""
         out.append(MeshFinding(f"plates fold at gap {gap:g}", 1, "the tightest hollow", advice, True))
-    elif gap is not None and gap * hollow > 0.3 and hollow * mesh.mean_edge > 0.3:
+    elif gap is not None and gap * hollow > HOLLOW and vague:
         advice = (
-            f"the least radius of curvature, {1.0 / hollow:.3g}, is known from few nodes: a finer mesh tells "
-            "whether the plates fold"
+            f"the least radius of curvature, {1.0 / hollow:.3g}, is known from few nodes: only a finer mesh "
+            "tells whether the plates fold"
         )
         out.append(MeshFinding(f"coarse for gap {gap:g}", 1, "the tightest hollow", advice, False))
     if count is not None and np.sqrt(mesh.area / count) < EDGES * mesh.mean_edge:

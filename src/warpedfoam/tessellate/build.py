@@ -26,6 +26,7 @@ from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import Layer
 from warpedfoam.tessellate.fields import SeedFields, seed_fields
 from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR, HeatGeodesics
+from warpedfoam.tessellate.power import power_weights
 from warpedfoam.tessellate.regions import (
     RegionNetwork,
     corner_weights,
@@ -41,6 +42,7 @@ TOO_LONG = "a film would be too long for the surface: it spans half a turn or mo
 #: Beyond these memory ends before patience does.
 MOST_NODES, MOST_BUBBLES = 5_000_000, 200_000
 SEED_KINDS = ("random", "blue", "lattice")
+CELL_KINDS = ("voronoi", "power")
 
 
 def voronoi_foam(
@@ -51,6 +53,7 @@ def voronoi_foam(
     seed: int | np.random.Generator = 0,
     lloyd: int = 0,
     volumes: float | ArrayLike | None = None,
+    cells: str = "voronoi",
     n_nodes: int | None = None,
     order: int = 4,
     progress: Callable[[str, float], None] | None = None,
@@ -76,6 +79,9 @@ def voronoi_foam(
     volumes : float or (n,) array, optional
         Target volumes: equal (default), an array that adds up to the cell's volume, or the width of
         a log-normal distribution (standard deviation of ln V).
+    cells : {"voronoi", "power"}, optional
+        Power cells hold the target volumes to a few percent from the start, which saves a polydisperse
+        foam most of the way (see `warpedfoam.tessellate.power`); even seeds suit them best.
     n_nodes : int, optional
         Nodes of the mesh that carries the distances; by default 24 per bubble (at least 4000),
         refined by itself where that is too coarse.
@@ -108,6 +114,7 @@ def voronoi_foam(
     count = len(points)
     sweeps = as_integer(lloyd, "lloyd", minimum=0, maximum=1000)
     targets = _target_volumes(cell, count, volumes, rng)
+    power = as_choice(cells, "cells", CELL_KINDS) == "power"
     p = as_integer(order, "order", minimum=2, maximum=MAX_ORDER)
     fixed = None if n_nodes is None else as_integer(n_nodes, "n_nodes", minimum=100, maximum=MOST_NODES)
     if fixed is not None and fixed < 6 * count:
@@ -137,6 +144,7 @@ def voronoi_foam(
                 nodes,
                 sweeps,
                 p,
+                power,
                 None if isinstance(seed, np.random.Generator) else int(seed),
                 progress,
             )
@@ -154,6 +162,7 @@ def _built(
     n_nodes: int,
     sweeps: int,
     order: int,
+    power: bool,
     seed: int | None,
     progress: Callable[[str, float], None] | None,
 ) -> Foam:
@@ -170,6 +179,8 @@ def _built(
     for sweep in range(sweeps):
         points = _centres(cell, mesh, fields(points, sweep).labels(), points)
     field = fields(points, sweeps)
+    if power:
+        field = field.weighted(power_weights(field, points, _node_volumes(cell, mesh), targets))
     labels, homes = field.labels(), _nearest_nodes(mesh, points)
     for _ in range(3):
         # an opened ring may cut off an island, an island given away may empty a region
@@ -272,6 +283,14 @@ def _target_volumes(
         )
     scaled: Floats = given * (cell.volume / total)
     return scaled
+
+
+def _node_volumes(cell: HeleShawCell, mesh: TriangleMesh) -> Floats:
+    """Volume between the plates that each mesh node stands for."""
+    k1, k2 = cell.surface.principal_curvatures(mesh.nodes).T
+    c0, c1, c2 = cell.layer.steiner
+    out: Floats = mesh.node_areas * (c0 + 0.5 * c1 * (k1 + k2) + c2 * k1 * k2)
+    return out
 
 
 def _nearest_nodes(mesh: TriangleMesh, points: Floats) -> Ints:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,10 @@ class SeedFields:
         best = np.argmin(self.squares, axis=1)
         out: Ints = self.seeds[np.arange(len(best)), best]
         return out
+
+    def weighted(self, weights: Floats) -> SeedFields:
+        """The same with d² − w of each seed instead of d²: power cells."""
+        return replace(self, squares=self.squares - weights[self.seeds])
 
     def square_to(self, nodes: Ints, seeds: Ints) -> tuple[Floats, Bools]:
         """d² from nodes to seeds (same shape), and whether it is known."""

@@ -1,0 +1,627 @@
+"""Mutated meshes and scrambled mesh files, and the worker process that takes them to a relaxed foam.
+
+Run as a script it reads names of cases, one a line, and answers each with one line of JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from warpedfoam.surfaces import TriangleMesh
+
+GAP_SHARE, N_BUBBLES, ORDER, STEPS = 0.01, 60, 2, 80
+#: Nodes of the meshes that carry integrals and distances: fewer than by default, to be quick.
+INTEGRAL_NODES, FOAM_NODES = 300, 900
+MEMORY = 4 << 30
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+# ---------------------------------------------------------------------------- sound meshes
+
+
+def base(name: str) -> Mesh:
+    """Nodes and triangles of a small sound mesh."""
+    from warpedfoam import Ellipsoid, Sphere, Torus
+
+    surface = {"sphere": Sphere(1.0), "torus": Torus(2.0, 1.0), "ellipsoid": Ellipsoid(1.0, 1.2, 1.5)}[name]
+    mesh = surface.triangulate(300)
+    return mesh.nodes.copy(), mesh.triangles.copy()
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """Several meshes as one, nothing merged."""
+    starts = np.cumsum([0] + [len(nodes) for nodes, _ in meshes])
+    nodes = np.concatenate([nodes for nodes, _ in meshes])
+    triangles = np.concatenate([tri + start for (_, tri), start in zip(meshes, starts, strict=False)])
+    return nodes, triangles
+
+
+# ---------------------------------------------------------------------------- mutations of meshes
+
+Mutation = Callable[[np.ndarray, np.ndarray, np.random.Generator], Mesh]
+
+
+def _cut(nodes, tri, rng, share=0.02):
+    return nodes, np.delete(tri, rng.choice(len(tri), max(1, int(share * len(tri))), replace=False), axis=0)
+
+
+def _cut_half(nodes, tri, rng):
+    return _cut(nodes, tri, rng, 0.5)
+
+
+def _cut_node(nodes, tri, rng):
+    gone = int(rng.integers(len(nodes)))
+    kept = tri[(tri != gone).all(axis=1)]
+    return np.delete(nodes, gone, axis=0), kept - (kept > gone)
+
+
+def _cut_shifted(nodes, tri, rng):
+    """A node deleted but the triangles not renumbered."""
+    return np.delete(nodes, rng.integers(len(nodes)), axis=0), tri
+
+
+def _flip(nodes, tri, rng, share=0.05):
+    chosen = rng.choice(len(tri), max(1, int(share * len(tri))), replace=False)
+    tri[chosen] = tri[chosen][:, ::-1]
+    return nodes, tri
+
+
+def _inside_out(nodes, tri, rng):
+    return nodes, tri[:, ::-1]
+
+
+def _bad_number(nodes, tri, rng):
+    nodes[rng.integers(len(nodes)), rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf])
+    return nodes, tri
+
+
+def _all_nan(nodes, tri, rng):
+    return np.full_like(nodes, np.nan), tri
+
+
+def _twin_node(nodes, tri, rng):
+    """A node given twice, each copy with some of the triangles."""
+    node = int(rng.integers(len(nodes)))
+    round_ = np.argwhere(tri == node)
+    for row, column in round_[: len(round_) // 2]:
+        tri[row, column] = len(nodes)
+    return np.concatenate([nodes, nodes[node : node + 1]]), tri
+
+
+def _soup(nodes, tri, rng):
+    """Every triangle with corners of its own."""
+    return nodes[tri].reshape(-1, 3), np.arange(tri.size).reshape(-1, 3)
+
+
+def _spare_node(nodes, tri, rng):
+    return np.concatenate([nodes, rng.standard_normal((3, 3))]), tri
+
+
+def _twice(nodes, tri, rng):
+    return nodes, np.concatenate([tri, tri[rng.integers(len(tri), size=3)]])
+
+
+def _back_to_back(nodes, tri, rng):
+    return nodes, np.concatenate([tri, tri[:, ::-1]])
+
+
+def _collapse(nodes, tri, rng):
+    """An edge of no length, its triangles kept."""
+    a, b = tri[rng.integers(len(tri)), :2]
+    nodes[a] = nodes[b]
+    return nodes, tri
+
+
+def _repeat_corner(nodes, tri, rng):
+    row = rng.integers(len(tri))
+    tri[row, 1] = tri[row, 0]
+    return nodes, tri
+
+
+def _sliver(nodes, tri, rng, share=1e-3):
+    """Nodes moved next to a neighbour."""
+    for _ in range(3):
+        a, b = tri[rng.integers(len(tri)), :2]
+        nodes[a] = nodes[b] + share * (nodes[a] - nodes[b])
+    return nodes, tri
+
+
+def _needle(nodes, tri, rng):
+    return _sliver(nodes, tri, rng, 1e-11)
+
+
+def _mild_sliver(nodes, tri, rng):
+    return _sliver(nodes, tri, rng, 0.1)
+
+
+def _cap(nodes, tri, rng):
+    """A triangle split at a point next to one of its edges."""
+    row = int(rng.integers(len(tri)))
+    a, b, c = tri[row]
+    middle = nodes[[a, b, c]].T @ [0.5, 0.4999, 0.0001]
+    new = len(nodes)
+    return np.vstack([nodes, middle]), np.vstack(
+        [np.delete(tri, row, axis=0), [[a, b, new], [b, c, new], [c, a, new]]]
+    )
+
+
+def _apart(nodes, tri, rng):
+    return joined((nodes, tri), (0.1 * nodes + [10.0, 0.0, 0.0], tri))
+
+
+def _nested(nodes, tri, rng):
+    return joined((nodes, tri), (0.5 * nodes, tri[:, ::-1]))
+
+
+def _halves(nodes, tri, rng):
+    """Two open pieces: a band cut away."""
+    middle = np.abs(nodes[tri].mean(axis=1)[:, 0]) > 0.2
+    return nodes, tri[middle]
+
+
+def _kissing(nodes, tri, rng):
+    """Two sheets that touch in a node."""
+    node = int(np.argmax(nodes[:, 0]))
+    both, triangles = joined(
+        (nodes, tri), (nodes * [-1.0, 1.0, 1.0] + [2 * nodes[node, 0], 0.0, 0.0], tri[:, ::-1])
+    )
+    triangles[triangles == node + len(nodes)] = node
+    keep = np.arange(len(both)) != node + len(nodes)
+    return both[keep], (np.cumsum(keep) - 1)[triangles]
+
+
+def _fin(nodes, tri, rng):
+    """A triangle standing on an edge."""
+    a, b = tri[rng.integers(len(tri)), :2]
+    return np.vstack([nodes, 1.5 * nodes[a] + [0.0, 0.0, 0.1]]), np.vstack([tri, [[b, a, len(nodes)]]])
+
+
+def _spike(nodes, tri, rng, factor=3.0):
+    node = rng.integers(len(nodes))
+    nodes[node] *= factor
+    return nodes, tri
+
+
+def _far_spike(nodes, tri, rng):
+    return _spike(nodes, tri, rng, 1e6)
+
+
+def _absurd_spike(nodes, tri, rng):
+    return _spike(nodes, tri, rng, 1e200)
+
+
+def _through(nodes, tri, rng):
+    """A node pushed through to the other side."""
+    return _spike(nodes, tri, rng, -1.5)
+
+
+def _noise(nodes, tri, rng, share=0.05):
+    h = np.linalg.norm(nodes[tri[:, 0]] - nodes[tri[:, 1]], axis=1).mean()
+    return nodes + share * h * rng.uniform(-1.0, 1.0, nodes.shape), tri
+
+
+def _much_noise(nodes, tri, rng):
+    return _noise(nodes, tri, rng, 0.5)
+
+
+def _mad_noise(nodes, tri, rng):
+    return _noise(nodes, tri, rng, 5.0)
+
+
+def _shuffled(nodes, tri, rng):
+    order = rng.permutation(len(nodes))
+    return nodes[order], np.argsort(order)[tri][rng.permutation(len(tri))]
+
+
+def _mixed_up(nodes, tri, rng):
+    """Nodes permuted without their triangles."""
+    return nodes[rng.permutation(len(nodes))], tri
+
+
+def _tiny(nodes, tri, rng):
+    return 1e-9 * nodes, tri
+
+
+def _huge(nodes, tri, rng):
+    return 1e9 * nodes, tri
+
+
+def _vanishing(nodes, tri, rng):
+    return 1e-200 * nodes, tri
+
+
+def _immense(nodes, tri, rng):
+    return 1e200 * nodes, tri
+
+
+def _far_off(nodes, tri, rng):
+    return nodes + 1e5, tri
+
+
+def _off_centre(nodes, tri, rng):
+    return nodes + 300.0, tri
+
+
+def _spindle(nodes, tri, rng):
+    """A ring narrower than its tube: it crosses itself."""
+    q = np.hypot(nodes[:, 0], nodes[:, 1])
+    nodes[:, :2] *= ((q - 1.3) / q)[:, None]
+    return nodes, tri
+
+
+def _lobes(nodes, tri, rng):
+    """Bent until its two ends go through each other."""
+    turn = np.pi * 1.15 * nodes[:, 2] / np.abs(nodes[:, 2]).max()
+    r = 1.5 + nodes[:, 0] * 0.5
+    return np.stack([r * np.cos(turn), 0.5 * nodes[:, 1], r * np.sin(turn)], axis=1), tri
+
+
+def _farthest(nodes, tri, rng):
+    return nodes + 1e14, tri
+
+
+def _flat(nodes, tri, rng):
+    return nodes * [1.0, 1.0, 0.0], tri
+
+
+def _flattened(nodes, tri, rng):
+    return nodes * [1.0, 1.0, 1e-3], tri
+
+
+def _point(nodes, tri, rng):
+    return np.zeros_like(nodes), tri
+
+
+def _pillow(nodes, tri, rng):
+    """A triangle and its back: closed, and nothing in it."""
+    return nodes[tri[0]], np.array([[0, 1, 2], [0, 2, 1]])
+
+
+def _one_triangle(nodes, tri, rng):
+    return nodes[tri[0]], np.array([[0, 1, 2]])
+
+
+def _tetrahedron(nodes, tri, rng):
+    corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    return corners, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+
+
+def _octahedron(nodes, tri, rng):
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    return corners, np.array(faces)
+
+
+def _hub(nodes, tri, rng):
+    """A fan: one node joined to all of a rim, above and below."""
+    turn = np.arange(200) * (2.0 * np.pi / 200)
+    rim = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    i = np.arange(200)
+    j = (i + 1) % 200
+    top = np.stack([i, j, 0 * i + 200], axis=1)
+    bottom = np.stack([j, i, 0 * i + 201], axis=1)
+    return np.concatenate([rim, [[0, 0, 1.0], [0, 0, -1.0]]]), np.concatenate([top, bottom])
+
+
+#: Mutations, how many seeds each is tried with, and on which meshes.
+MUTATIONS: dict[str, tuple[Mutation, int]] = {
+    "cut": (_cut, 5), "cut_half": (_cut_half, 2), "cut_node": (_cut_node, 4),
+    "cut_shifted": (_cut_shifted, 3), "flip": (_flip, 5), "inside_out": (_inside_out, 1),
+    "bad_number": (_bad_number, 6), "all_nan": (_all_nan, 1), "twin_node": (_twin_node, 4),
+    "soup": (_soup, 2), "spare_node": (_spare_node, 2), "twice": (_twice, 3),
+    "back_to_back": (_back_to_back, 1), "collapse": (_collapse, 4), "repeat_corner": (_repeat_corner, 3),
+    "sliver": (_sliver, 1), "needle": (_needle, 3), "mild_sliver": (_mild_sliver, 1), "cap": (_cap, 1),
+    "apart": (_apart, 3), "nested": (_nested, 2), "halves": (_halves, 2), "kissing": (_kissing, 2),
+    "fin": (_fin, 3), "spike": (_spike, 2), "far_spike": (_far_spike, 2),
+    "absurd_spike": (_absurd_spike, 2), "through": (_through, 3), "noise": (_noise, 1),
+    "much_noise": (_much_noise, 3), "mad_noise": (_mad_noise, 3), "shuffled": (_shuffled, 1),
+    "mixed_up": (_mixed_up, 2), "tiny": (_tiny, 1), "huge": (_huge, 1), "vanishing": (_vanishing, 1),
+    "immense": (_immense, 1), "off_centre": (_off_centre, 1), "spindle": (_spindle, 1),
+    "lobes": (_lobes, 3), "far_off": (_far_off, 1), "farthest": (_farthest, 1), "flat": (_flat, 1),
+    "flattened": (_flattened, 2), "point": (_point, 1), "pillow": (_pillow, 1),
+    "one_triangle": (_one_triangle, 1), "tetrahedron": (_tetrahedron, 1), "octahedron": (_octahedron, 1),
+    "hub": (_hub, 1),
+}  # fmt: skip
+
+
+#: Mutations that leave a mesh to carry a foam: on the sphere, where foams are quickest.
+SOUND = ("sliver", "mild_sliver", "cap", "noise", "tiny", "huge", "off_centre", "twin_node", "soup")
+
+
+# ---------------------------------------------------------------------------- files
+
+
+def _ply_text(nodes, tri):
+    head = (
+        f"ply\nformat ascii 1.0\nelement vertex {len(nodes)}\nproperty double x\nproperty double y\n"
+        f"property double z\nelement face {len(tri)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    lines = [" ".join(f"{x:.17g}" for x in p) for p in nodes] + [f"3 {a} {b} {c}" for a, b, c in tri]
+    return (head + "\n".join(lines) + "\n").encode()
+
+
+def _ply_binary(nodes, tri):
+    head, _ = _ply_text(nodes, tri).split(b"end_header\n")
+    head = head.replace(b"ascii", b"binary_little_endian") + b"end_header\n"
+    faces = np.zeros(len(tri), dtype=[("n", "u1"), ("v", "<i4", 3)])
+    faces["n"], faces["v"] = 3, tri
+    return head + nodes.astype("<f8").tobytes() + faces.tobytes()
+
+
+def _obj(nodes, tri):
+    lines = ["v " + " ".join(f"{x:.17g}" for x in p) for p in nodes]
+    return ("\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in tri]) + "\n").encode()
+
+
+def _off(nodes, tri):
+    lines = ["OFF", f"{len(nodes)} {len(tri)} 0"] + [" ".join(f"{x:.17g}" for x in p) for p in nodes]
+    return ("\n".join(lines + [f"3 {a} {b} {c}" for a, b, c in tri]) + "\n").encode()
+
+
+def _stl_text(nodes, tri):
+    out = ["solid thing"]
+    for corners in nodes[np.minimum(tri, len(nodes) - 1)]:
+        out += ["facet normal 0 0 0", "outer loop"]
+        out += ["vertex " + " ".join(f"{x:.9g}" for x in p) for p in corners]
+        out += ["endloop", "endfacet"]
+    return ("\n".join([*out, "endsolid thing"]) + "\n").encode()
+
+
+def _stl_binary(nodes, tri):
+    body = np.zeros(len(tri), dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    with np.errstate(over="ignore"):
+        body["v"] = nodes[np.minimum(tri, len(nodes) - 1)]
+    return b"thing".ljust(80) + struct.pack("<I", len(tri)) + body.tobytes()
+
+
+FORMATS: dict[str, tuple[str, Callable[[np.ndarray, np.ndarray], bytes]]] = {
+    "ply": (".ply", _ply_text),
+    "plyb": (".ply", _ply_binary),
+    "obj": (".obj", _obj),
+    "off": (".off", _off),
+    "stl": (".stl", _stl_text),
+    "stlb": (".stl", _stl_binary),
+}
+
+Scramble = Callable[[bytes, np.random.Generator, str], bytes]
+
+
+def _flip_bytes(data: bytes, rng: np.random.Generator, count: int) -> bytes:
+    raw = np.frombuffer(data, dtype=np.uint8).copy()
+    raw[rng.integers(len(raw), size=count)] ^= rng.integers(1, 256, size=count).astype(np.uint8)
+    return raw.tobytes()
+
+
+def _recount(data: bytes, new: bytes, kind: str) -> bytes:
+    """Another number of triangles (of STL text, which counts nothing: of the solid's first vertex)."""
+    if kind == "stlb":
+        try:
+            number = int(new) % 2**32
+        except ValueError:
+            number = 0
+        return data[:80] + struct.pack("<I", number) + data[84:]
+    pattern = {
+        "off": rb"^(OFF\n\d+ )\d+", "obj": rb"(\nf )\d+", "stl": rb"(vertex )\S+",
+    }.get(kind, rb"(element face )\d+")  # fmt: skip
+    return re.sub(pattern, lambda m: m.group(1) + new, data, count=1)
+
+
+def _recount_nodes(data: bytes, new: bytes, kind: str) -> bytes:
+    pattern = {"off": rb"^(OFF\n)\d+", "obj": rb"(\nf \d+ )\d+"}.get(kind, rb"(element vertex )\d+")
+    return re.sub(pattern, lambda m: m.group(1) + new, data, count=1)
+
+
+def _text_number(data: bytes, rng: np.random.Generator, word: bytes) -> bytes:
+    """Some number in the body replaced by a word."""
+    places = [m.span() for m in re.finditer(rb"-?\d\.\d+(e-?\d+)?", data)]
+    if not places:
+        return data[:200] + word + data[200:]
+    lo, hi = places[int(rng.integers(len(places)))]
+    return data[:lo] + word + data[hi:]
+
+
+SCRAMBLES: dict[str, tuple[Scramble, int]] = {
+    "byte": (lambda data, rng, kind: _flip_bytes(data, rng, 1), 2),
+    "bytes": (lambda data, rng, kind: _flip_bytes(data, rng, 20), 2),
+    "many_bytes": (lambda data, rng, kind: _flip_bytes(data, rng, len(data) // 5), 1),
+    "head_bytes": (lambda data, rng, kind: _flip_bytes(data[:150], rng, 3) + data[150:], 2),
+    "cut": (lambda data, rng, kind: data[: int(rng.uniform(0.05, 0.98) * len(data))], 3),
+    "cut_tail": (lambda data, rng, kind: data[:-7], 1),
+    "cut_head": (lambda data, rng, kind: data[int(rng.integers(1, 60)) :], 1),
+    "head_only": (lambda data, rng, kind: data[:60], 1),
+    "more": (lambda data, rng, kind: data + bytes(rng.integers(256, size=500).astype(np.uint8)), 1),
+    "fewer_faces": (lambda data, rng, kind: _recount(data, b"100", kind), 1),
+    "more_faces": (lambda data, rng, kind: _recount(data, b"2000", kind), 1),
+    "huge_faces": (lambda data, rng, kind: _recount(data, b"2000000000", kind), 1),
+    "absurd_faces": (lambda data, rng, kind: _recount(data, b"99999999999999999999", kind), 1),
+    "minus_faces": (lambda data, rng, kind: _recount(data, b"-5", kind), 1),
+    "word_faces": (lambda data, rng, kind: _recount(data, b"many", kind), 1),
+    "huge_nodes": (lambda data, rng, kind: _recount_nodes(data, b"2000000000", kind), 1),
+    "zero_nodes": (lambda data, rng, kind: _recount_nodes(data, b"0", kind), 1),
+    "nan": (lambda data, rng, kind: _text_number(data, rng, b"nan"), 1),
+    "inf": (lambda data, rng, kind: _text_number(data, rng, b"-inf"), 1),
+    "word": (lambda data, rng, kind: _text_number(data, rng, b"1.0.0"), 1),
+    "overflow": (lambda data, rng, kind: _text_number(data, rng, b"1e999"), 1),
+    "windows": (lambda data, rng, kind: data.replace(b"\n", b"\r\n"), 1),
+    "nulls": (lambda data, rng, kind: data[:300] + bytes(300) + data[300:], 1),
+    "doubled": (lambda data, rng, kind: data + data, 1),
+    "one_line": (lambda data, rng, kind: data.replace(b"\n", b" "), 1),
+}
+
+#: Whole files of nonsense, under every ending.
+JUNK: dict[str, Callable[[np.random.Generator], bytes]] = {
+    "empty": lambda rng: b"",
+    "noise": lambda rng: bytes(rng.integers(256, size=5000).astype(np.uint8)),
+    "zeros": lambda rng: bytes(5000),
+    "prose": lambda rng: b"It was a dark and stormy night; the foam fell in torrents.\n" * 20,
+    "blank": lambda rng: b"\n" * 1000,
+}
+ENDINGS = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
+
+
+# ---------------------------------------------------------------------------- cases
+
+
+#: What the tests of the worker itself ask for.
+STOPS: dict[str, Callable[[], object]] = {
+    "stop/crash": lambda: os.kill(os.getpid(), 11),
+    "stop/hang": lambda: time.sleep(1000),
+    "stop/memory": lambda: np.ones(2 * MEMORY, dtype=np.uint8),
+}
+
+
+def all_cases() -> list[str]:
+    """Names of all cases; a name says everything about its case."""
+    bases, formats = ("sphere", "ellipsoid", "torus"), tuple(FORMATS)
+    out, turn = [], 0
+    for name, (_, seeds) in MUTATIONS.items():
+        for seed in range(seeds):
+            # formats that share nodes: in the others each triangle would have corners of its own
+            shape = "torus" if name == "spindle" else "sphere" if name in SOUND else bases[turn % 3]
+            out.append(f"mesh/{name}/{shape}/{formats[turn % 4 if turn % 5 else turn % 6]}/{seed}")
+            turn += 1
+    for kind in formats:
+        for name, (_, seeds) in SCRAMBLES.items():
+            for seed in range(seeds):
+                out.append(f"file/{name}/{bases[turn % 2]}/{kind}/{seed}")
+                turn += 1
+        for ending in (e for e in ENDINGS if e != FORMATS[kind][0]):
+            out.append(f"ending/{ending}/sphere/{kind}/0")
+    out += [f"junk/{name}/none/{ending}/0" for name in JUNK for ending in ENDINGS]
+    return out
+
+
+def case_file(case: str) -> tuple[str, bytes]:
+    """Ending and content of a case's file."""
+    sort, name, shape, kind, seed = case.split("/")
+    rng = np.random.default_rng([int(seed), *case.encode()])
+    if sort == "junk":
+        return kind, JUNK[name](rng)
+    ending, write = FORMATS[kind]
+    nodes, triangles = base(shape)
+    if sort == "mesh":
+        return ending, write(*MUTATIONS[name][0](nodes, triangles, rng))
+    data = write(nodes, triangles)
+    if sort == "ending":
+        return name, data
+    return ending, SCRAMBLES[name][0](data, rng, kind)
+
+
+# ---------------------------------------------------------------------------- the worker
+
+
+def outcome(case: str, folder: Path, known: dict[bytes, dict[str, object]]) -> dict[str, object]:
+    """What becomes of a case: ``state`` is refused, converged, not converged, or WRONG with a reason.
+
+    Files that hold a mesh seen before, to six digits, need not be taken to a foam again: ``known`` has
+    the answer.
+    """
+    from warpedfoam.errors import WarpedFoamError
+    from warpedfoam.surfaces import read_mesh
+
+    if case in STOPS:
+        STOPS[case]()
+    ending, data = case_file(case)
+    path = folder / f"mesh{ending}"
+    path.write_bytes(data)
+    stages = ["read"]
+    try:
+        mesh = read_mesh(path)
+        key = " ".join(f"{x:.6g}" for x in mesh.nodes.ravel()).encode() + mesh.triangles.tobytes()
+        if key not in known:
+            known[key] = foam_of(mesh, stages)
+        return known[key]
+    except (ValueError, TypeError, OSError, WarpedFoamError) as fault:
+        if len(str(fault)) < 20 or stages[-1] == "report":
+            return {"state": "WRONG", "reason": f"unclear, or not for {stages[-1]} to raise: {fault!r}"}
+        return {"state": "refused", "stage": stages[-1], "reason": str(fault)}
+
+
+def foam_of(mesh: TriangleMesh, stages: list[str]) -> dict[str, object]:
+    """The outcome of a mesh that could be read; ``stages`` is told how far it comes."""
+    from warpedfoam import HeleShawCell, MeshSurface, relax, voronoi_foam
+    from warpedfoam.errors import MeshError
+    from warpedfoam.surfaces import mesh_report
+
+    stages.append("report")
+    report = mesh_report(mesh)
+    stages.append("surface")
+    try:
+        surface = MeshSurface(mesh.nodes, mesh.triangles)
+    except MeshError as fault:
+        if report.sound:
+            return {"state": "WRONG", "reason": f"the report finds it sound, the surface refuses: {fault}"}
+        raise
+    if not report.sound:
+        return {"state": "WRONG", "reason": f"the surface accepts, the report finds {report.findings}"}
+    stages.append("cell")
+    cell = HeleShawCell(surface, gap=GAP_SHARE * float(np.ptp(mesh.nodes, axis=0).max()))
+    stages.append("foam")
+    foam = voronoi_foam(cell, N_BUBBLES, seeds="blue", seed=1, n_nodes=FOAM_NODES, order=ORDER)
+    stages.append("relax")
+    relaxed = relax(foam, max_iterations=STEPS)
+    chi, charges = mesh.euler_characteristic, int(relaxed.foam.network.charges.sum())
+    area = surface.area / mesh.area
+    volumes = relaxed.foam.bubble_volumes.sum() / cell.volume
+    facts = {"area": area, "reason": relaxed.message, "notes": [f.fault for f in report.findings]}
+    if charges != 6 * chi:
+        return {**facts, "state": "WRONG", "reason": f"charges add to {charges}, χ is {chi}"}
+    if not 0.9 < area < 1.1:
+        return {**facts, "state": "WRONG", "reason": f"the smooth surface has {area:.3g} times the area"}
+    if relaxed.converged and not abs(volumes - 1.0) < 1e-3:
+        return {**facts, "state": "WRONG", "reason": f"the volumes add up to {volumes} of the cell's"}
+    return {**facts, "state": "converged" if relaxed.converged else "not converged"}
+
+
+def main() -> None:
+    """Answer cases until the input ends."""
+    import faulthandler
+
+    faulthandler.enable()
+    try:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    except ImportError:  # not on Windows
+        pass
+    import warnings
+
+    from warpedfoam.surfaces.level import LevelSurface
+
+    LevelSurface.integral_nodes = INTEGRAL_NODES
+    warnings.simplefilter("error")
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # whatever libraries print must not come between the answers
+    known: dict[bytes, dict[str, object]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for line in sys.stdin:
+            start = time.perf_counter()
+            try:
+                result = outcome(line.strip(), Path(folder), known)
+            except Exception as fault:
+                result = {"state": "WRONG", "reason": f"unexpected {fault!r}", "trace": _last_lines(fault)}
+            result = {**result, "seconds": time.perf_counter() - start}
+            print(json.dumps(result), file=answers, flush=True)
+
+
+def _last_lines(fault: BaseException) -> str:
+    import traceback
+
+    return "".join(traceback.format_exception(fault)[-4:])
+
+
+if __name__ == "__main__":
+    main()
