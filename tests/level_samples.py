@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from warpedfoam import (
+    Cylinder,
     Ellipsoid,
     FlatTorus,
+    Graph,
     HeleShawCell,
     Implicit,
     MeshSurface,
+    Revolution,
     SchwarzP,
     Sphere,
     Torus,
@@ -33,6 +36,29 @@ def ring_gradient(x):
     q = np.hypot(x[:, 0], x[:, 1])
     share = 2.0 * (q - RING) / q
     return np.stack([share * x[:, 0], share * x[:, 1], 2.0 * x[:, 2]], axis=1)
+
+
+def hill_height(x):
+    """A landscape of periods 8 and 6."""
+    u, v = 2 * np.pi * x.T / [[8.0], [6.0]]
+    return 0.5 * np.cos(u) + 0.4 * np.sin(v) + 0.2 * np.cos(u - v)
+
+
+def hill_slope(x):
+    a, b = 2 * np.pi / 8.0, 2 * np.pi / 6.0
+    u, v = a * x[:, 0], b * x[:, 1]
+    by_u = -0.5 * np.sin(u) - 0.2 * np.sin(u - v)
+    by_v = 0.4 * np.cos(v) + 0.2 * np.sin(u - v)
+    return np.stack([a * by_u, b * by_v], axis=1)
+
+
+def vase_square(z):
+    """Squared radius of a body with a waist."""
+    return (1 - z**2 / 9) * (1 + z**2 / 3)
+
+
+def vase_slope(z):
+    return -2 * z / 9 * (1 + z**2 / 3) + (1 - z**2 / 9) * 2 * z / 3
 
 
 RING_BOX = [[-4.6, -4.6, -1.6], [4.6, 4.6, 1.6]]
@@ -61,13 +87,16 @@ FAMILY = {
     "egg": Member(Ellipsoid(1.0, 1.2, 1.5), None, 2, 0, 1e-12),
     "disk": Member(Ellipsoid(3.0, 3.0, 2.0), None, 2, 1, 1e-12),
     "ring": Member(Implicit(ring_level, ring_gradient, RING_BOX), Torus(RING, TUBE), 0, 1, 1e-8),
+    "vase": Member(Revolution(vase_square, vase_slope, -3.0, 3.0), None, 2, 1, 1e-9),
     "sheet": Member(FlatTorus(10.0, 8.0), None, 0, 2, 1e-12),
+    "tube": Member(Cylinder(1.5, 8.0, periodic=True), None, 0, 2, 1e-12),
+    "hills": Member(Graph(hill_height, hill_slope, 8.0, 6.0, periodic=True), None, 0, 0, 1e-8),
     "crystal": Member(SchwarzP(6.0), None, -4, 0, 1e-12),
     "mesh": Member(MeshSurface(*jittered(Torus(RING, TUBE), 3000)), Torus(RING, TUBE), 0, 1, 2e-3),
 }
 
 #: Bubbles that resolve the narrow ones.
-COUNTS = {"ring": 240, "mesh": 160, "crystal": 200}
+COUNTS = {"vase": 200, "ring": 240, "mesh": 160, "crystal": 200, "tube": 240, "hills": 240}
 
 each_member = pytest.mark.parametrize("member", FAMILY.values(), ids=FAMILY)
 formulas = pytest.mark.parametrize(

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpedfoam import Ellipsoid, Foam, HeleShawCell, Implicit, Sphere, equilibrium_report, relax
+from warpedfoam import (
+    Ellipsoid,
+    Foam,
+    HeleShawCell,
+    Implicit,
+    Revolution,
+    Sphere,
+    equilibrium_report,
+    relax,
+)
 from warpedfoam.energy import film_terms
 from warpedfoam.foam import bubble_integrals
 from warpedfoam.kernels.nets import surface_net
@@ -22,6 +31,8 @@ from .level_samples import (
     ring_gradient,
     ring_level,
     twins,
+    vase_slope,
+    vase_square,
 )
 
 # ---------------------------------------------------------------------------- points and curvatures
@@ -100,6 +111,15 @@ def test_area_of_an_oblate_spheroid_is_a_closed_form():
     assert Ellipsoid(a, a, c).gaussian_curvature([[0.0, 0.0, c]])[0] == pytest.approx(c**2 / a**4, rel=1e-12)
 
 
+def test_spheroids_are_surfaces_of_revolution():
+    egg = Revolution(lambda z: 4.0 * (1.0 - z**2 / 9.0), lambda z: -8.0 * z / 9.0, -3.0, 3.0)
+    same = Ellipsoid(2.0, 2.0, 3.0)
+    assert egg.area == pytest.approx(same.area, rel=1e-9)
+    x = same.random_points(100, 0)
+    np.testing.assert_allclose(egg.project(x), x, atol=1e-12)
+    np.testing.assert_allclose(egg.principal_curvatures(x), same.principal_curvatures(x), atol=1e-8)
+
+
 @each_member
 def test_symmetries_are_found_and_tangent(member):
     surface = member.surface
@@ -152,7 +172,8 @@ def test_random_points_are_uniform_by_area(member):
     points = surface.random_points(20_000, 7)
     again = surface.random_points(20_000, 7)
     np.testing.assert_array_equal(points, again)
-    nodes, weights = surface._patches.quadrature()
+    rule = surface._patches.quadrature()
+    nodes, weights = rule.points, rule.weights
     centres = surface.random_points(25, 8)
     period = surface.period
     nearest = [
@@ -364,6 +385,14 @@ def test_rotations_change_nothing():
     [
         (lambda: Ellipsoid(1.0, 0.0, 1.0), "b must be greater than 0"),
         (lambda: Ellipsoid(1.0, "x", 1.0), "b must be a number"),
+        (lambda: Revolution(1, vase_slope, -3, 3), "square must be callable"),
+        (lambda: Revolution(vase_square, vase_slope, 3, -3), "top must lie above bottom"),
+        (lambda: Revolution(vase_square, vase_slope, -2, 2), "square must be 0 at bottom and top"),
+        (lambda: Revolution(vase_square, vase_square, -3, 3), "slope is not the derivative"),
+        (
+            lambda: Revolution(lambda z: (9 - z**2) ** 2, lambda z: -4 * z * (9 - z**2), -3, 3),
+            "must be round",
+        ),
         (lambda: Implicit(1, ring_gradient, RING_BOX), "function must be callable"),
         (lambda: Implicit(ring_level, None, RING_BOX), "gradient must be callable"),
         (lambda: Implicit(ring_level, ring_gradient, RING_BOX[::-1]), "lower one first"),

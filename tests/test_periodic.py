@@ -7,8 +7,10 @@ import pytest
 import trimesh
 
 from warpedfoam import (
+    Cylinder,
     FlatTorus,
     Foam,
+    Graph,
     HeleShawCell,
     SchwarzP,
     Sphere,
@@ -30,7 +32,7 @@ from warpedfoam.surfaces.places import Places
 from warpedfoam.tessellate import HeatGeodesics
 from warpedfoam.tessellate.intrinsic_heat import IntrinsicHeat
 
-from .level_samples import relaxed_on
+from .level_samples import hill_height, hill_slope, relaxed_on
 
 COLUMNS, ROWS = 6, 8
 
@@ -164,6 +166,26 @@ def test_energies_do_not_depend_on_the_unit():
     np.testing.assert_allclose(away, 0.0, atol=1e-8)
 
 
+def test_a_cylinder_is_a_rolled_up_sheet():
+    """Leading order: the relaxed foam has the flat foam's energy to 1e-9, and its pressures."""
+    gap, radius, height = 1e-7, 1.5, 8.0
+    tube, sheet = Cylinder(radius, height, periodic=True), FlatTorus(2 * np.pi * radius, height)
+    flat = relax(voronoi_foam(HeleShawCell(sheet, gap), 100, seed=4), order=8)
+    cell = HeleShawCell(tube, gap)
+    start = Foam(
+        cell,
+        flat.foam.network,
+        tube.rolled(flat.foam.vertex_points),
+        np.zeros_like(flat.foam.film_offsets),
+        flat.foam.target_volumes * cell.volume / flat.foam.cell.volume,
+    )
+    rolled = relax(start, order=8, t1=False)
+    assert flat.converged
+    assert rolled.converged
+    assert rolled.energy == pytest.approx(flat.energy, rel=1e-9 + gap / radius)
+    np.testing.assert_allclose(rolled.pressures, flat.pressures, atol=1e-6 * np.ptp(flat.pressures))
+
+
 # ---------------------------------------------------------------------------- Schwarz's P surface
 
 
@@ -220,6 +242,14 @@ def test_bubbles_are_drawn_whole(name, tmp_path):
     [
         (lambda: FlatTorus(0.0, 1.0), "width must be greater than 0"),
         (lambda: FlatTorus(1.0, np.inf), "height must be finite"),
+        (lambda: Cylinder(1.0, 2.0), "rims is not available yet"),
+        (lambda: Cylinder(1.0, 0.0, periodic=True), "height must be greater than 0"),
+        (lambda: Cylinder(1.0, 1.0, periodic=1), "periodic must be True or False"),
+        (lambda: Graph(hill_height, hill_slope, 8.0, 6.0), "rims is not available yet"),
+        (lambda: Graph(hill_height, hill_slope, 7.0, 6.0, periodic=True), "does not repeat"),
+        (lambda: Graph(hill_height, hill_height, 8.0, 6.0, periodic=True), "gradient's values"),
+        (lambda: Graph(hill_height, lambda x: x, 8.0, 6.0, periodic=True), "gradient is not that"),
+        (lambda: Graph("h", hill_slope, 8.0, 6.0, periodic=True), "function must be callable"),
         (lambda: SchwarzP(-1.0), "cell_length must be greater than 0"),
         (lambda: SchwarzP("a"), "cell_length must be a number"),
     ],

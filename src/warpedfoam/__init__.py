@@ -42,11 +42,14 @@ from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import plot_foam, save_picture
 from warpedfoam.relax import Relaxation, relax
 from warpedfoam.surfaces import (
+    Cylinder,
     Ellipsoid,
     FlatTorus,
+    Graph,
     Implicit,
     LevelSurface,
     MeshSurface,
+    Revolution,
     SchwarzP,
     Sphere,
     Surface,
@@ -62,11 +65,13 @@ __version__ = "0.1.0"
 __all__ = [
     "CellNetwork",
     "ConvergenceError",
+    "Cylinder",
     "Ellipsoid",
     "EquilibriumReport",
     "FileFormatError",
     "FlatTorus",
     "Foam",
+    "Graph",
     "HeatGeodesics",
     "HeleShawCell",
     "Implicit",
@@ -75,6 +80,7 @@ __all__ = [
     "MeshSurface",
     "Relaxation",
     "ResolutionError",
+    "Revolution",
     "SchwarzP",
     "SideDistribution",
     "Sphere",

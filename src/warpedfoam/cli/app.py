@@ -191,6 +191,11 @@ _add_surface(
     {"a": "Semi-axis along x.", "b": "Semi-axis along y.", "c": "Semi-axis along z."},
 )
 _add_surface(
+    "cylinder",
+    "A foam between two coaxial cylinders whose ends are joined.",
+    {"radius": "Radius of the inner plate.", "height": "Period along the axis."},
+)
+_add_surface(
     "flat_torus",
     "A foam between two flat plates, repeating in both directions.",
     {"width": "Period along x.", "height": "Period along y."},

@@ -17,6 +17,7 @@ from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
 from warpedfoam.surfaces import (
+    Cylinder,
     Ellipsoid,
     FlatTorus,
     MeshSurface,
@@ -35,6 +36,7 @@ MAKERS: Mapping[str, Callable[..., Surface]] = {
     "torus": Torus,
     "sphere": Sphere,
     "ellipsoid": Ellipsoid,
+    "cylinder": lambda radius, height: Cylinder(radius, height, periodic=True),
     "flat_torus": FlatTorus,
     "schwarz_p": SchwarzP,
     "mesh": lambda file: MeshSurface.from_file(file),

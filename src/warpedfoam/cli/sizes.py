@@ -8,6 +8,7 @@ SIZES: Mapping[str, Mapping[str, float | str]] = {
     "torus": {"major_radius": 20.0, "minor_radius": 4.0},
     "sphere": {"radius": 10.0},
     "ellipsoid": {"a": 10.0, "b": 12.0, "c": 15.0},
+    "cylinder": {"radius": 6.0, "height": 40.0},
     "flat_torus": {"width": 40.0, "height": 30.0},
     "schwarz_p": {"cell_length": 20.0},
     "mesh": {"file": ""},

@@ -66,13 +66,14 @@ def fit_jets(points: Floats, normals: Floats, spacing: Floats, reach: Floats, ne
         for _ in range(ROUNDS):
             frame = frames_of(normal)
             u, v, z = np.moveaxis(np.einsum("nix,nkx->nki", frame, away) / h[..., None], 2, 0)
-            rows = np.empty((*u.shape, len(POWERS)))
-            rows[..., 0] = 1.0
-            for k, (i, j) in enumerate(POWERS[1:], start=1):
+            monomials = [np.ones_like(u)]
+            for i, j in POWERS[1:]:
                 # one more factor on a monomial that is there already
-                rows[..., k] = rows[..., POWERS.index((i - 1, j) if i else (i, j - 1))] * (u if i else v)
-            left = np.matmul((weight[..., None] * rows).transpose(0, 2, 1), rows)
-            right = np.einsum("nk,nki,nk->ni", weight, rows, z)
+                monomials.append(monomials[POWERS.index((i - 1, j) if i else (i, j - 1))] * (u if i else v))
+            rows = np.stack(monomials, axis=1)
+            weighted = rows * weight[:, None]
+            left = np.matmul(weighted, rows.transpose(0, 2, 1))
+            right = np.einsum("nik,nk->ni", weighted, z)
             size = np.einsum("nii->n", left)
             fit = np.linalg.solve(left + size[:, None, None] * stiffness, right[..., None])[..., 0]
             tilted = normal - fit[:, 1:2] * frame[:, 0] - fit[:, 2:3] * frame[:, 1]

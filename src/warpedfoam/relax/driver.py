@@ -37,6 +37,8 @@ EXACT_BELOW, EXACT_ABOVE, EXACT_STEP = 0.02, 0.1, 0.2
 LEAST_SHARE = 0.1
 #: Shifts of the exact steps, in γ d / ℓ.
 LEAST_SHIFT, MOST_SHIFT = 1e-10, 0.03
+#: Least share of a step that is tried after one that led nowhere.
+LEAST_STEP = 0.01
 #: Relative error that the total of rough volumes may show.
 DRAFT = 0.03
 #: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
@@ -63,6 +65,7 @@ class _Run:
     events: list[T1Event] = field(default_factory=list)
     is_minimum: bool = False
     fault: str = ""
+    share: float = 1.0
 
 
 def relax(
@@ -143,6 +146,10 @@ def relax(
     )
     residuals, converged = _iterate(run, tol, limit, progress)
     clock.lap("total")
+    if run.fault and not _adds_up(run):
+        # what cannot be told apart from a slipped film is not handed out
+        run.state = state
+        run.events.clear()
     state = run.state
     pressures = frozen((state.pressures - state.pressures.mean()) * scale)
     final = replace(
@@ -167,11 +174,16 @@ def relax(
     )
 
 
+def _adds_up(run: _Run) -> bool:
+    """Whether the volumes of the run's state add up, computed in full."""
+    return run.system.linearise(run.state).slip <= run.foam.cell.surface.precision
+
+
 def _iterate(
     run: _Run, tolerance: float, limit: int, progress: Callable[[str, float], None] | None
 ) -> tuple[Residuals, bool]:
     exact = False
-    sound = run.state
+    sound = (run.state, len(run.events), run.turns.copy())
     while True:
         lin = run.system.linearise(run.state, draft=not exact)
         now = lin.residuals
@@ -183,10 +195,18 @@ def _iterate(
         done = now.force <= tolerance and held <= max(0.01 * tolerance, 1e-12)
         slipped = lin.slip > (DRAFT if lin.draft else run.foam.cell.surface.precision)
         if slipped or not np.isfinite(now.force):
-            run.fault = SLIPPED if slipped else DEGENERATE
-            run.state = sound
-            return now, False
-        sound = run.state
+            run.state, kept, run.turns = sound
+            del run.events[kept:]
+            run.share *= 0.5
+            if run.share < LEAST_STEP or run.iteration >= limit or run.state is lin.state:
+                run.fault = SLIPPED if slipped else DEGENERATE
+                return now, False
+            # a shorter step from where all was well
+            lin = run.system.linearise(run.state, draft=not exact)
+            now = lin.residuals
+        else:
+            sound = (run.state, len(run.events), run.turns.copy())
+            run.share = min(1.0, 1.5 * run.share)
         if lin.draft and (done or run.iteration >= limit):
             exact = True
             continue
@@ -228,7 +248,7 @@ def _proximal_step(run: _Run, lin: Linearised) -> None:
     bend = np.abs(step.offsets).max(axis=1, initial=0.0, keepdims=True)
     offsets = step.offsets * np.minimum(1.0, OFFSET_CAP / np.maximum(bend, 1e-300))
     # now and then half a step: it lands in the middle of a two-cycle, and breaks it
-    share = 0.5 if run.iteration % 7 == 6 else 1.0
+    share = run.share * (0.5 if run.iteration % 7 == 6 else 1.0)
     _advance(run, Step(share * vertices, share * offsets, share * step.pressures))
 
 
@@ -277,7 +297,7 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
         side = 1.0 if float((mode * step.vertices).sum()) >= 0.0 else -1.0
         step = Step(step.vertices + side * KICK * mode, step.offsets, step.pressures)
         size = max(size, KICK)
-    share = min(1.0, EXACT_STEP / max(size, 1e-300))
+    share = run.share * min(1.0, EXACT_STEP / max(size, 1e-300))
     _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
 
 

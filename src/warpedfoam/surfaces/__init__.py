@@ -1,28 +1,34 @@
 """Smooth surfaces and their triangulations; they know arcs, not foams."""
 
+from warpedfoam.surfaces.cylinder import Cylinder
 from warpedfoam.surfaces.ellipsoid import Ellipsoid
 from warpedfoam.surfaces.files import read_mesh
 from warpedfoam.surfaces.flat_torus import FlatTorus
+from warpedfoam.surfaces.graph import Graph
 from warpedfoam.surfaces.health import MeshFinding, MeshReport, mesh_report, repaired
 from warpedfoam.surfaces.implicit import Implicit
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.mesh_surface import MeshSurface
 from warpedfoam.surfaces.protocol import ArcTerms, Layer, Surface
+from warpedfoam.surfaces.revolution import Revolution
 from warpedfoam.surfaces.schwarz_p import SchwarzP
 from warpedfoam.surfaces.sphere import Sphere
 from warpedfoam.surfaces.torus import Torus
 
 __all__ = [
     "ArcTerms",
+    "Cylinder",
     "Ellipsoid",
     "FlatTorus",
+    "Graph",
     "Implicit",
     "Layer",
     "LevelSurface",
     "MeshFinding",
     "MeshReport",
     "MeshSurface",
+    "Revolution",
     "SchwarzP",
     "Sphere",
     "Surface",

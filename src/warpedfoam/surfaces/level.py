@@ -146,24 +146,37 @@ class LevelSurface(ABC):
         assert shape is not None
         return normal, shape
 
-    def _landed(self, points: Floats, axes: Floats, *, second: bool) -> tuple[Floats, Floats | None]:
-        """Normals and shape operators where lines from near points meet the surface, to about 1e-9.
+    def _settled(self, points: Floats, axes: Floats) -> tuple[Floats, Floats, Floats]:
+        """Where lines from near points meet the surface, normals and shape operators there."""
+        found, normal, shape = self._landed(points, axes, second=True)
+        assert shape is not None
+        return found, normal, shape
 
-        One step and a look at where it led; only lines that are not there yet go on.
+    def _landed(self, points: Floats, axes: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
+        """Where lines from near points meet the surface, to about 1e-9; normals and shape operators there.
+
+        A step or two and a look at where they led; only lines that are not there yet go on.
         """
-        value, gradient, _ = self.level(points, second=False)
+        near, live, scale = points.copy(), np.arange(len(points)), self.size
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            step = value / arcs.dots(gradient, axes)
-            near = points - np.clip(step, -0.2 * self.size, 0.2 * self.size)[:, None] * axes
+            for _ in range(2):
+                value, gradient, _ = self.level(near[live], second=False)
+                step = np.clip(value / arcs.dots(gradient, axes[live]), -0.2 * scale, 0.2 * scale)
+                near[live] -= step[:, None] * axes[live]
+                live = live[~(np.abs(step) <= 3e-5 * scale)]
+                if not live.size:
+                    break
             value, gradient, bend = self.level(near, second=second)
-            off = np.abs(value / arcs.dots(gradient, axes))
-            late = np.flatnonzero(~(off <= 1e-9 * self.size))
+            left = value / arcs.dots(gradient, axes)
+            late = np.flatnonzero(~(np.abs(left) <= 1e-9 * scale))
             if late.size:
-                _, gradient[late], again = self.level(self.foot(near[late], axes[late]), second=second)
+                near[late], left[late] = self.foot(near[late], axes[late]), 0.0
+                _, gradient[late], again = self.level(near[late], second=second)
                 if bend is not None and again is not None:
                     bend = np.array(bend)
                     bend[late] = again
-        return _normal_shape(gradient, bend)
+        # the look's own step costs nothing more
+        return (near - left[:, None] * axes, *_normal_shape(gradient, bend))
 
     def normals(self, points: ArrayLike) -> Floats:
         """∇f/|∇f| at the projections of the points."""
@@ -185,14 +198,14 @@ class LevelSurface(ABC):
 
     @cached_property
     def _patches(self) -> PatchedMesh:
-        return PatchedMesh(self.triangulate(self.integral_nodes), self.foot, self._unit)
+        return PatchedMesh(self.triangulate(self.integral_nodes), self._settled, self._unit)
 
     @cached_property
     def _moments(self) -> tuple[float, float, float, float, float]:
         """∫ dA, ∫ H dA, ∫ G dA, and the range of the principal curvatures."""
-        points, weights = self._patches.quadrature()
-        _, shape = self._shape(points)
-        mean, gauss = _mean_gauss(shape)
+        rule = self._patches.quadrature()
+        mean, gauss = _mean_gauss(rule.shapes)
+        weights = rule.weights
         root = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
         return (
             float(weights.sum()),
@@ -247,18 +260,25 @@ class LevelSurface(ABC):
     @cached_property
     def _symmetries(self) -> tuple[Floats, Floats]:
         """Combinations (k, 6) of the six generators that are tangent everywhere, and the centre."""
-        points, weights = self._patches.quadrature()
+        rule = self._patches.quadrature()
+        points, weights = rule.points, rule.weights
         centre = weights @ points / weights.sum()
-        # what repeats in space cannot turn
-        spread = _generators(points - centre, self.size)[: 6 if self.period is None else 3]
-        across = np.einsum("anx,nx->an", spread, self._unit(points))
+        spread = _generators(points - centre, self.size)[self._generators]
+        across = np.einsum("anx,nx->an", spread, rule.normals)
         tangent = (across * weights) @ across.T
         whole = np.einsum("n,anx,bnx->ab", weights, spread, spread)
         root = np.linalg.inv(np.linalg.cholesky(whole))
         values, vectors = np.linalg.eigh(root @ tangent @ root.T)
         found = np.zeros((int((values < self.symmetry).sum()), 6))
-        found[:, : len(spread)] = (root.T @ vectors[:, values < self.symmetry]).T
+        found[:, self._generators] = (root.T @ vectors[:, values < self.symmetry]).T
         return frozen(found), frozen(centre)
+
+    @property
+    def _generators(self) -> Ints:
+        """Translations and rotations that respect the period: none turns a direction that repeats."""
+        repeats = np.zeros(3, dtype=bool) if self.period is None else np.isfinite(self.period)
+        turns = [k for k in range(3) if not np.delete(repeats, k).any()]
+        return np.array([0, 1, 2, *(3 + k for k in turns)])
 
     # --- arcs -------------------------------------------------------------------------------------
 
@@ -331,7 +351,7 @@ class LevelSurface(ABC):
         bent = c1 != 0.0 or c2 != 0.0
 
         def land(points: Floats, axes: Floats) -> tuple[Floats, Floats]:
-            normal, shape = self._landed(points, axes, second=bent)
+            _, normal, shape = self._landed(points, axes, second=bent)
             if shape is None:
                 return normal, np.full(len(points), c0)
             mean, gauss = _mean_gauss(shape)

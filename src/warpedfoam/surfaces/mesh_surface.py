@@ -100,14 +100,14 @@ class MeshSurface(LevelSurface):
         """
         with np.errstate(all="ignore"):
             try:
-                points, weights = self._patches.quadrature()
+                rule = self._patches.quadrature()
                 total = self._moments[2] / (2.0 * np.pi)
             except np.linalg.LinAlgError:
                 raise MeshError(f"no smooth surface passes through the mesh; {SMOOTHER}") from None
-        torn = ~(np.isfinite(points).all(axis=1) & np.isfinite(weights))
+        torn = ~(np.isfinite(rule.points).all(axis=1) & np.isfinite(rule.weights))
         if torn.any():
             fine = self.triangulate(self.integral_nodes)
-            first = int(np.flatnonzero(torn)[0]) * fine.n_triangles // len(weights)
+            first = int(np.flatnonzero(torn)[0]) * fine.n_triangles // len(rule.weights)
             raise MeshError(self._torn(fine.nodes[fine.triangles[first, 0]]))
         if not abs(total - self.euler_characteristic) < TOTAL_CURVATURE:
             raise MeshError(

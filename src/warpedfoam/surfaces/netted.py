@@ -40,7 +40,16 @@ class NettedSurface(LevelSurface):
             for _ in range(2):
                 step = max(step * float(np.sqrt(len(nodes) / count)), span / FINEST)
                 nodes, triangles = self.net(step)
-            known[count] = self._evened(nodes, triangles)
+            for last in (False, False, False, True):
+                try:
+                    known[count] = self._evened(nodes, triangles)
+                    break
+                except MeshError:
+                    # a grid that cuts a saddle badly joins its sheets: another one does not
+                    if last:
+                        raise
+                    step *= 0.93
+                    nodes, triangles = self.net(step)
         return known[count]
 
     def net(self, step: float) -> tuple[Floats, Ints]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
 
 from warpedfoam.arrays import Floats, Ints
-from warpedfoam.kernels.height_arcs import Foot, dots
+from warpedfoam.kernels.height_arcs import dots
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
 
@@ -39,61 +40,75 @@ def triangle_rule(which: int) -> tuple[Floats, Floats]:
     return np.array(points), shares / shares.sum()
 
 
+#: Moves points along axes to the surface: there they are, with normals and shape operators.
+Landing = Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]
+
+
+@dataclass(frozen=True, eq=False)
+class Quadrature:
+    """Points (n, 3) of a surface, weights (n,) that add up to its area, normals and shape operators."""
+
+    points: Floats
+    weights: Floats
+    normals: Floats
+    shapes: Floats
+
+
 class PatchedMesh:
     """Each triangle's points moved to the surface along the interpolated normals of its corners.
 
     Neighbours share the normals along their edge, so the patches meet without gap or overlap.
     """
 
-    def __init__(self, mesh: TriangleMesh, foot: Foot, unit: Callable[[Floats], Floats]) -> None:
-        self._mesh, self._foot, self._unit = mesh, foot, unit
+    def __init__(self, mesh: TriangleMesh, land: Landing, unit: Callable[[Floats], Floats]) -> None:
+        self._mesh, self._land = mesh, land
         self._normals = unit(mesh.nodes)
         self._rule = triangle_rule(int(mesh.n_triangles > MANY))
-        self._ready: tuple[Floats, Floats] | None = None
+        self._ready: Quadrature | None = None
 
-    def _lifted(self, triangles: Ints, shares: Floats) -> tuple[Floats, Floats]:
-        """Points (n, 3) of triangles at barycentric ``shares`` (n, 3), and dA over the unit triangle."""
+    def _lifted(self, triangles: Ints, shares: Floats) -> Quadrature:
+        """Points of triangles at barycentric ``shares`` (n, 3), weighted by dA over the unit triangle."""
         corners, normals = self._corners(triangles), self._normals[triangles]
         flat = np.einsum("ni,nix->nx", shares, corners)
         axes = np.einsum("ni,nix->nx", shares, normals)
-        points = self._foot(flat, axes)
-        n = self._unit(points)
+        points, n, shapes = self._land(flat, axes)
         slope = dots(axes, n)
         height = dots(points - flat, axes) / dots(axes, axes)
         sides = []
         for i in (1, 2):
             move = corners[:, i] - corners[:, 0] + height[:, None] * (normals[:, i] - normals[:, 0])
             sides.append(move - (dots(move, n) / slope)[:, None] * axes)
-        return points, 0.5 * dots(np.cross(sides[0], sides[1]), n)
+        return Quadrature(points, 0.5 * dots(np.cross(sides[0], sides[1]), n), n, shapes)
 
     def _corners(self, triangles: Ints) -> Floats:
         corners = self._mesh.nodes[triangles]
         return corners[:, :1] + nearest_image(corners - corners[:, :1], self._mesh.period)
 
-    def quadrature(self) -> tuple[Floats, Floats]:
-        """Points of the surface and their weights, which add up to its area."""
+    def quadrature(self) -> Quadrature:
+        """A rule for integrals over the whole surface."""
         if self._ready is None:
             shares, weights = self._rule
             triangles = np.repeat(self._mesh.triangles, len(shares), axis=0)
-            points, areas = self._lifted(triangles, np.tile(shares, (self._mesh.n_triangles, 1)))
-            self._ready = points, areas * np.tile(weights, self._mesh.n_triangles)
+            found = self._lifted(triangles, np.tile(shares, (self._mesh.n_triangles, 1)))
+            self._ready = replace(found, weights=found.weights * np.tile(weights, self._mesh.n_triangles))
         return self._ready
 
     def random_points(self, count: int, rng: np.random.Generator) -> Floats:
         """Points drawn uniformly by area, (count, 3)."""
-        _, weights = self.quadrature()
+        weights = self.quadrature().weights
         per = len(weights) // self._mesh.n_triangles
         stretch = weights.reshape(-1, per) / self._rule[1]
         most = 1.05 * stretch.max(axis=1)
+        below = np.cumsum(most) / most.sum()
         found: list[Floats] = []
         missing = count
         while missing > 0:
             draw = rng.random((missing + missing // 5 + 16, 4))
-            triangle = np.searchsorted(np.cumsum(most) / most.sum(), draw[:, 0])
+            triangle = np.minimum(np.searchsorted(below, draw[:, 0]), len(below) - 1)
             a, b = draw[:, 1], draw[:, 2]
             a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
-            points, area = self._lifted(self._mesh.triangles[triangle], np.stack([1.0 - a - b, a, b], axis=1))
-            kept = points[draw[:, 3] * most[triangle] < area][:missing]
+            drawn = self._lifted(self._mesh.triangles[triangle], np.stack([1.0 - a - b, a, b], axis=1))
+            kept = drawn.points[draw[:, 3] * most[triangle] < drawn.weights][:missing]
             found.append(kept)
             missing -= len(kept)
         return np.concatenate(found) if found else np.zeros((0, 3))
