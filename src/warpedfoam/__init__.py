@@ -58,7 +58,13 @@ from warpedfoam.surfaces import (
     mesh_report,
     read_mesh,
 )
-from warpedfoam.tessellate import HeatGeodesics, geodesic_distances, voronoi_foam
+from warpedfoam.tessellate import (
+    GeodesicDistances,
+    HeatGeodesics,
+    geodesic_distances,
+    geodesic_report,
+    voronoi_foam,
+)
 
 __version__ = "0.1.0"
 
@@ -71,6 +77,7 @@ __all__ = [
     "FileFormatError",
     "FlatTorus",
     "Foam",
+    "GeodesicDistances",
     "Graph",
     "HeatGeodesics",
     "HeleShawCell",
@@ -92,6 +99,7 @@ __all__ = [
     "WarpedFoamError",
     "equilibrium_report",
     "geodesic_distances",
+    "geodesic_report",
     "load",
     "mesh_report",
     "network_from_loops",

@@ -25,6 +25,7 @@ def fan_integrals(
     shifts: Floats | None,
     foot: Foot,
     land: Landing,
+    unit: Callable[[Floats], Floats],
     n_radial: int,
 ) -> Floats:
     """∫ w dA inside each loop, (n_loops,), from the nodes (K, F, 3) of its arcs.
@@ -52,7 +53,11 @@ def fan_integrals(
     # vector area about the loop's own centre, not the origin: far away loops keep their digits
     origin = centre[owner] if shifts is None else centre[owner] - shifts
     turned = np.add.reduceat(sign * (twist[film] - np.cross(origin, run[film])), loops.starts)
-    axis = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-300)
+    size = np.linalg.norm(turned, axis=1, keepdims=True)
+    axis = turned / np.maximum(size, 1e-300)
+    # a loop without area has no axis of its own
+    none = np.flatnonzero(size[:, 0] <= 1e-12 * weight**2)
+    axis[none] = unit(centre[none])
     centre = foot(centre, axis)
     normal, _ = land(centre, axis)
     tilt = normal / dots(normal, axis)[:, None]

@@ -10,6 +10,7 @@ from warpedfoam.surfaces.implicit import Implicit
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.mesh_surface import MeshSurface
+from warpedfoam.surfaces.netted import NettedSurface
 from warpedfoam.surfaces.protocol import ArcTerms, Layer, Surface
 from warpedfoam.surfaces.revolution import Revolution
 from warpedfoam.surfaces.schwarz_p import SchwarzP
@@ -28,6 +29,7 @@ __all__ = [
     "MeshFinding",
     "MeshReport",
     "MeshSurface",
+    "NettedSurface",
     "Revolution",
     "SchwarzP",
     "Sphere",

@@ -360,7 +360,9 @@ def _closed_findings(mesh: TriangleMesh) -> list[MeshFinding]:
     cosine = np.einsum("nx,nx->n", normal[owner], normal[owner[twin]])
     sharp = np.flatnonzero((cosine < np.cos(np.radians(CREASE))) & (start < end))
     if len(sharp):
-        advice = "it will be rounded off over an edge or two; use a finer or smoother mesh"
+        advice = (
+            "up to 75 degrees or so they are rounded off, with ripples for three edges; use a smoother mesh"
+        )
         out.append(
             MeshFinding(
                 f"creases (over {CREASE:g} degrees)",

@@ -360,7 +360,9 @@ class LevelSurface(ABC):
         back = (loops.halves & 1).astype(bool)[:, None]
         first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]
         shifts = loop_shifts(np.where(back, last, first), np.where(back, first, last), loops, self.period)
-        return fan_integrals(placed.rule, placed.points, loops, shifts, self.foot, land, layer.rays)
+        return fan_integrals(
+            placed.rule, placed.points, loops, shifts, self.foot, land, self._unit, layer.rays
+        )
 
 
 def _normal_shape(gradient: Floats, second: Floats | None) -> tuple[Floats, Floats | None]:

@@ -13,8 +13,8 @@ from warpedfoam.kernels.height_arcs import dots
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
 
-#: Rules on a triangle (Dunavant 1985): degree 6 with 12 points, degree 4 with 6, as barycentric triples
-#: (whose permutations follow) and weights; meshes of more triangles than this take the second.
+#: Rules on a triangle (Dunavant 1985): degree 6 with 12 points, 4 with 6, 2 with 3, as barycentric triples
+#: (whose permutations follow) and weights; from so many triangles on the second and third do.
 RULES = (
     (
         (0.116786275726379, (0.501426509658179, 0.249286745170910, 0.249286745170910)),
@@ -25,8 +25,9 @@ RULES = (
         (0.223381589678011, (0.108103018168070, 0.445948490915965, 0.445948490915965)),
         (0.109951743655322, (0.816847572980459, 0.091576213509771, 0.091576213509771)),
     ),
+    ((1.0 / 3.0, (2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0)),),
 )
-MANY = 12_000
+MANY = (12_000, 100_000)
 
 
 def triangle_rule(which: int) -> tuple[Floats, Floats]:
@@ -63,7 +64,7 @@ class PatchedMesh:
     def __init__(self, mesh: TriangleMesh, land: Landing, unit: Callable[[Floats], Floats]) -> None:
         self._mesh, self._land = mesh, land
         self._normals = unit(mesh.nodes)
-        self._rule = triangle_rule(int(mesh.n_triangles > MANY))
+        self._rule = triangle_rule(sum(mesh.n_triangles > many for many in MANY))
         self._ready: Quadrature | None = None
 
     def _lifted(self, triangles: Ints, shares: Floats) -> Quadrature:
