@@ -307,3 +307,61 @@ def test_tolerance_has_a_ceiling() -> None:
     """A tolerance that would call anything converged is refused."""
     with pytest.raises(ValueError, match="tolerance must be at most"):
         wf.relax(wf.voronoi_foam(CELLS["sphere"], 20, seeds="lattice"), tolerance=1.0)
+
+
+def test_a_step_that_leads_nowhere_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces that are undefined at one state: the run goes back and takes a shorter step."""
+    from warpedfoam.relax import system
+
+    foam = wf.voronoi_foam(wf.HeleShawCell(wf.Sphere(1.0), 0.02), 60, seed=3)
+    usual = wf.relax(foam)
+    calls = {"n": 0}
+    plain = system.film_terms
+
+    def undefined_now_and_then(*args, **named):
+        calls["n"] += 1
+        terms = plain(*args, **named)
+        if calls["n"] in (4, 9):
+            terms.gradient[:] = np.nan
+        return terms
+
+    monkeypatch.setattr(system, "film_terms", undefined_now_and_then)
+    result = wf.relax(foam)
+    assert calls["n"] > usual.iterations
+    assert result.converged
+    assert result.is_minimum
+    assert len(result.events) == result.n_t1
+
+
+def test_a_run_that_leads_nowhere_hands_out_a_sound_foam(monkeypatch: pytest.MonkeyPatch) -> None:
+    from warpedfoam.relax import system
+
+    foam = wf.voronoi_foam(wf.HeleShawCell(wf.Sphere(1.0), 0.02), 60, seed=3)
+    calls = {"n": 0}
+    plain = system.film_terms
+
+    def undefined_from_now_on(*args, **named):
+        calls["n"] += 1
+        terms = plain(*args, **named)
+        if calls["n"] > 5:
+            terms.gradient[:] = np.nan
+        return terms
+
+    monkeypatch.setattr(system, "film_terms", undefined_from_now_on)
+    result = wf.relax(foam)
+    assert not result.converged
+    assert "infinite or undefined" in result.message
+    assert result.foam.bubble_volumes.sum() == pytest.approx(foam.cell.volume, rel=1e-9)
+    assert result.foam.network.charges.sum() == 12
+
+
+def test_round_off_of_the_total_is_shared_out() -> None:
+    """No bubble bears what the volumes together are off by."""
+    from warpedfoam.relax.system import State, System
+
+    foam = wf.voronoi_foam(wf.HeleShawCell(wf.Sphere(1.0), 0.02), 60, seed=3)
+    system = System(foam.cell, foam.target_volumes * (1.0 + 1e-9), 4, factoriser("superlu", 60), 60)
+    state = State(foam.network, foam.vertex_points, foam.film_offsets, np.zeros(60))
+    found = system.linearise(state)
+    assert found.volume_fault.sum() == pytest.approx(0.0, abs=1e-12)
+    assert found.slip == pytest.approx(1e-9, rel=1e-3)

@@ -198,12 +198,14 @@ def _iterate(
             run.state, kept, run.turns = sound
             del run.events[kept:]
             run.share *= 0.5
-            if run.share < LEAST_STEP or run.iteration >= limit or run.state is lin.state:
+            hopeless = run.share < LEAST_STEP or run.iteration >= limit or run.state is lin.state
+            if not hopeless:
+                # a shorter step from where all was well
+                lin = run.system.linearise(run.state, draft=not exact)
+                now, hopeless = lin.residuals, not np.isfinite(lin.residuals.force)
+            if hopeless:
                 run.fault = SLIPPED if slipped else DEGENERATE
                 return now, False
-            # a shorter step from where all was well
-            lin = run.system.linearise(run.state, draft=not exact)
-            now = lin.residuals
         else:
             sound = (run.state, len(run.events), run.turns.copy())
             run.share = min(1.0, 1.5 * run.share)
