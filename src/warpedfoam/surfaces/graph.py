@@ -45,8 +45,8 @@ class Graph(LevelSurface):
     >>> hills = Graph(
     ...     lambda x: np.cos(k * x).sum(axis=1), lambda x: -k * np.sin(k * x), 10.0, 10.0, periodic=True
     ... )
-    >>> hills.gaussian_curvature([[0.0, 0.0, 2.0]]).round(6), round(k**4, 6)
-    (array([0.155854]), 0.155855)
+    >>> bool(abs(hills.gaussian_curvature([[0.0, 0.0, 2.0]])[0] - k**4) < 1e-5)
+    True
     """
 
     function: Callable[[Floats], Floats]
