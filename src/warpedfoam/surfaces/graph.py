@@ -82,10 +82,10 @@ class Graph(LevelSurface):
         return FlatTorus(self.width, self.height)
 
     def _height(self, x: Floats) -> Floats:
-        return as_floats(self.function(x), "function's values", (len(x),))
+        return as_floats(self.function(x.copy()), "function's values", (len(x),))
 
     def _slope(self, x: Floats) -> Floats:
-        return as_floats(self.gradient(x), "gradient's values", (len(x), 2))
+        return as_floats(self.gradient(x.copy()), "gradient's values", (len(x), 2))
 
     @property
     def period(self) -> Floats | None:

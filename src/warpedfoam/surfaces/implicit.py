@@ -35,7 +35,8 @@ class Implicit(NettedSurface):
     TypeError, ValueError
         If a function is not callable, returns the wrong shape, or ``gradient`` is not f's gradient.
     MeshError
-        If f does not change sign in the box, or f = 0 reaches its walls or is not one closed surface.
+        If f does not change sign in the box, or f = 0 reaches its walls; once it is
+        meshed, if it is not one closed surface.
 
     Examples
     --------
@@ -77,6 +78,8 @@ class Implicit(NettedSurface):
         put(self, "bounds", frozen(box))
         nodes, _ = self.net(float((box[1] - box[0]).max()) / FIRST_LOOK)
         self._check_gradient(nodes)
+        if hessian is not None:
+            self._check_hessian(hessian, nodes)
 
     def _check_gradient(self, points: Floats) -> None:
         h = STEP * self.size
@@ -91,12 +94,25 @@ class Implicit(NettedSurface):
                 f"{given[bad].round(4).tolist()}, differences of function give {found}"
             )
 
+    def _check_hessian(self, hessian: Callable[[Floats], Floats], points: Floats) -> None:
+        given = as_floats(hessian(points.copy()), "hessian's values", (len(points), 3, 3))
+        h = STEP * self.size
+        rows = [(self._g(points + h * e) - self._g(points - h * e)) / (2.0 * h) for e in np.eye(3)]
+        fault = np.abs(np.stack(rows, axis=1) - given).max(axis=(1, 2))
+        most = max(float(np.abs(given).max()), float(np.abs(self._g(points)).max()) / self.size)
+        if not (fault <= 10.0 * GRADIENT_ERROR * most).all():
+            bad = int(np.nanargmax(fault))
+            raise ValueError(
+                f"hessian is not that of function: at {points[bad].round(4).tolist()} it is off by "
+                f"{fault[bad]:.3g}; correct it or leave it out"
+            )
+
     def values(self, points: Floats) -> Floats:
         """The user's function."""
-        return as_floats(self.function(points), "function's values", (len(points),))
+        return as_floats(self.function(points.copy()), "function's values", (len(points),))
 
     def _g(self, points: Floats) -> Floats:
-        return as_floats(self.gradient(points), "gradient's values", (len(points), 3))
+        return as_floats(self.gradient(points.copy()), "gradient's values", (len(points), 3))
 
     @property
     def size(self) -> float:
@@ -117,7 +133,7 @@ class Implicit(NettedSurface):
         if not second:
             return value, slope, None
         if self.hessian is not None:
-            return value, slope, as_floats(self.hessian(safe), "hessian's values", (len(points), 3, 3))
+            return value, slope, as_floats(self.hessian(safe.copy()), "hessian's values", (len(points), 3, 3))
         h = STEP * self.size
         rows = [(self._g(safe + h * e) - self._g(safe - h * e)) / (2.0 * h) for e in np.eye(3)]
         bend = np.stack(rows, axis=1)

@@ -74,10 +74,10 @@ class Revolution(NettedSurface):
             raise ValueError("slope must be above 0 at bottom and below 0 at top: the poles must be round")
 
     def _s(self, z: Floats) -> Floats:
-        return as_floats(self.square(z), "square's values", (len(z),))
+        return as_floats(self.square(z.copy()), "square's values", (len(z),))
 
     def _ds(self, z: Floats) -> Floats:
-        return as_floats(self.slope(z), "slope's values", (len(z),))
+        return as_floats(self.slope(z.copy()), "slope's values", (len(z),))
 
     @property
     def _reach(self) -> float:

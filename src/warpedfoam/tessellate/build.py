@@ -309,9 +309,11 @@ def _centres(cell: HeleShawCell, mesh: TriangleMesh, labels: Ints, points: Float
 
 
 def _fitting(cell: HeleShawCell) -> int:
-    """Bubbles so small that three of them go round the tightest circle, of girth 2π / k_max."""
-    sharpest = max(abs(k) for k in cell.surface.curvature_range())
-    return int(np.ceil(cell.surface.area * (3.0 * sharpest / (2.0 * np.pi)) ** 2))
+    """Bubbles so small that three of them go round the tightest circle, 2π / k_max or a period."""
+    around = max(abs(k) for k in cell.surface.curvature_range()) / (2.0 * np.pi)
+    if cell.surface.period is not None:
+        around = max(around, 1.0 / float(cell.surface.period.min()))
+    return int(np.ceil(cell.surface.area * (3.0 * around) ** 2))
 
 
 def _advice(cell: HeleShawCell, count: int, n_nodes: int) -> str:
