@@ -30,7 +30,8 @@ class Worker:
     def start(self) -> subprocess.Popen[str]:
         one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
         self.process = subprocess.Popen(
-            [sys.executable, str(ROOT / "tests" / "mutated_meshes.py")],
+            [sys.executable, "-m", "tests.mutated_meshes"],
+            cwd=ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

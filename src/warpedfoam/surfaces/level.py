@@ -12,6 +12,7 @@ from warpedfoam.arrays import Floats, Ints, as_generator, as_integer, as_points,
 from warpedfoam.errors import MeshError
 from warpedfoam.kernels import height_arcs as arcs
 from warpedfoam.kernels.fans import fan_integrals
+from warpedfoam.kernels.jets import frames_of
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.nodal import bump_offsets
 from warpedfoam.kernels.periodic import loop_shifts, nearest_image
@@ -243,12 +244,12 @@ class LevelSurface(ABC):
 
     def vertex_frames(self, points: Floats) -> Floats:
         """Two tangent unit vectors e1, e2 with e1 × e2 = n, by the branchless rule of Duff et al. (2017)."""
-        return _frames(self._unit(points))
+        return frames_of(self._unit(points))[:, :2]
 
     def retract(self, points: Floats, steps: Floats) -> Floats:
         """Move in the tangent plane, then along the old normal to the surface."""
         normal = self._unit(points)
-        frames = _frames(normal)
+        frames = frames_of(normal)[:, :2]
         return self.foot(points + np.einsum("ni,nix->nx", steps, frames), normal)
 
     def rigid_motions(self, points: Floats) -> Floats:
@@ -311,7 +312,7 @@ class LevelSurface(ABC):
         shape = placed.points.shape
         normal, bend = self._shape(placed.points.reshape(-1, 3))
         normals, shapes = normal.reshape(shape), bend.reshape(*shape, 3)
-        frames = (_frames(normals[0]), _frames(normals[-1]))
+        frames = (frames_of(normals[0])[:, :2], frames_of(normals[-1])[:, :2])
         moves = arcs.jacobians(placed, normals, shapes, frames)
         second = jump is not None
         value, gradient, hessian = arcs.film_terms(
@@ -392,16 +393,6 @@ def _spread_out(points: Floats, count: int, spacing: float, period: Floats | Non
         if len(chosen) >= count:
             return chosen[:count]
     return np.arange(count)
-
-
-def _frames(normals: Floats) -> Floats:
-    x, y, z = normals.T
-    sign = np.where(z >= 0.0, 1.0, -1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    second = np.stack([b, sign + y * y * a, -y], axis=1)
-    return np.stack([first, second], axis=1)
 
 
 def _generators(points: Floats, size: float) -> Floats:
