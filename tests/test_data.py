@@ -49,7 +49,7 @@ def test_files_are_closed_surfaces(script: ModuleType, name: str) -> None:
     path = DATA / name
     assert path.stat().st_size < 200_000
     mesh = wf.TriangleMesh.from_trimesh(load(path))
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     assert mesh.euler_characteristic == EULER[name]
     surface = script.SURFACES[name]
     off = np.linalg.norm(surface.project(mesh.nodes) - mesh.nodes, axis=1).max()

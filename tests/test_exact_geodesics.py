@@ -136,7 +136,7 @@ def test_points_on_edges_make_no_flat_triangles():
     share = np.array([0.4, 0.6, 0.0])
     nodes, triangles, _ = exact_geodesics._with_node(MESH.nodes, MESH.triangles, 100, share)
     split = TriangleMesh(nodes, triangles)
-    split.require_closed_surface()
+    split.require_surface(closed=True)
     assert split.n_triangles == MESH.n_triangles + 2
 
 

@@ -156,7 +156,7 @@ def test_frames_and_retraction(member):
 def test_triangulations_are_closed_and_on_the_surface(member, n_nodes):
     surface = member.surface
     mesh = surface.triangulate(n_nodes)
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     assert mesh.euler_characteristic == member.euler
     np.testing.assert_allclose(surface.project(mesh.nodes), mesh.nodes, atol=1e-9 * surface.size)
     assert surface.area == pytest.approx(mesh.area, rel=0.03)
@@ -215,7 +215,7 @@ def test_surface_nets_close_round_a_sphere():
     grid = np.stack(np.meshgrid(*[np.linspace(-1.3, 1.3, 40)] * 3, indexing="ij"), axis=-1)
     nodes, triangles = surface_net(np.linalg.norm(grid, axis=-1) - 1.0)
     mesh = TriangleMesh(nodes * 2.6 / 39 - 1.3, triangles)
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     assert mesh.euler_characteristic == 2
     np.testing.assert_allclose(np.linalg.norm(mesh.nodes, axis=1), 1.0, atol=3e-3)
     a, b, c = (mesh.nodes[mesh.triangles[:, i]] for i in range(3))

@@ -288,7 +288,7 @@ def test_quadrilaterals_are_cut_in_two(tmp_path):
         mesh = read_mesh(path)
         assert (mesh.n_nodes, mesh.n_triangles) == (8, 12)
         assert mesh.area == pytest.approx(6.0)
-        mesh.require_closed_surface()
+        mesh.require_surface(closed=True)
 
 
 def test_textured_obj_with_seams_is_one_closed_mesh(tmp_path):
@@ -307,7 +307,7 @@ def test_textured_obj_with_seams_is_one_closed_mesh(tmp_path):
     path.write_text("\n".join(lines) + "\n")
     mesh = read_mesh(path)
     assert (mesh.n_nodes, mesh.n_triangles) == (252, 500)
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
 
 
 def test_glb_scene_is_joined_as_it_is_placed(tmp_path):

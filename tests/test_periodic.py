@@ -110,7 +110,7 @@ def test_nets_of_grids_that_repeat_are_closed():
     grid = np.stack(np.meshgrid(*[np.arange(n) / n * 2 * np.pi] * 3, indexing="ij"), axis=-1)
     nodes, triangles = surface_net(np.cos(grid).sum(axis=-1), periodic=True)
     mesh = TriangleMesh(nodes, triangles, np.full(3, float(n)))
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     assert mesh.euler_characteristic == -4
 
 
@@ -118,7 +118,7 @@ def test_nets_of_grids_that_repeat_are_closed():
 def test_flat_triangulations(n_nodes):
     sheet = FlatTorus(10.0, 8.0)
     mesh = sheet.triangulate(n_nodes)
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     assert mesh.euler_characteristic == 0
     assert mesh.area == pytest.approx(80.0, rel=1e-12)
     assert sheet.triangulate(n_nodes) is mesh

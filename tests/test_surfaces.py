@@ -181,7 +181,7 @@ def corner_angles(mesh):
 @pytest.mark.parametrize("n_nodes", [150, 1000, 5000, 20_000])
 def test_triangulations(surface, n_nodes):
     mesh = surface.triangulate(n_nodes)
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     assert mesh.euler_characteristic == surface.euler_characteristic
     np.testing.assert_allclose(surface.project(mesh.nodes), mesh.nodes, atol=1e-13 * surface.size)
     corners = mesh.nodes[mesh.triangles]

@@ -24,6 +24,13 @@ class Loops:
         """Number of half-arcs of each loop."""
         return np.diff(np.append(self.starts, len(self.halves)))
 
+    @property
+    def following(self) -> Ints:
+        """Place in ``halves`` of the half-arc that comes after each, round its loop."""
+        after = np.arange(1, len(self.halves) + 1)
+        after[self.starts + self.sizes - 1] = self.starts
+        return after
+
 
 def loops_of(following: Ints, owner: Ints) -> Loops:
     """Loops of the permutation ``following``, sorted by ``owner`` (constant along a loop).

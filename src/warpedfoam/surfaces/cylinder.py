@@ -1,39 +1,42 @@
-"""The cylinder, repeating along its axis."""
+"""The cylinder, between two rims or repeating along its axis."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_flag, as_generator, as_integer, as_number
+from warpedfoam.arrays import Bools, Floats, as_flag, as_generator, as_integer, as_number
 from warpedfoam.surfaces.flat_torus import FlatTorus
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.protocol import SIZES, Layer
+from warpedfoam.surfaces.turned import turned_mesh, turned_rims
 
 
 @dataclass(frozen=True)
 class Cylinder(LevelSurface):
-    """Cylinder of a radius about the z axis, its ends joined: it repeats after ``height``. Normals outward.
+    """Cylinder of a radius about the z axis, |z| ≤ height/2, with a rim at both ends. Normals outward.
 
-    It is isometric to a flat torus 2πr wide, so that a foam in a thin gap has the flat foam's energy.
+    A periodic one has its ends joined: it repeats after ``height`` and is isometric to a flat torus 2πr
+    wide, so that a foam in a thin gap has the flat foam's energy.
 
     Parameters
     ----------
     radius, height : float
         Above 0.
-    periodic : bool
-        Must be True: cylinders that end in rims are not available yet.
+    periodic : bool, optional
+        Whether the ends are joined.
 
     Raises
     ------
     TypeError, ValueError
-        If a size is not a finite number above 0, or ``periodic`` is not True.
+        If a size is not a finite number above 0, or ``periodic`` no bool.
 
     Examples
     --------
-    >>> tube = Cylinder(radius=1.0, height=5.0, periodic=True)
+    >>> tube = Cylinder(radius=1.0, height=5.0)
     >>> tube.principal_curvatures([[2.0, 0.0, 0.0]])
     array([[1., 0.]])
     """
@@ -45,13 +48,12 @@ class Cylinder(LevelSurface):
     def __post_init__(self) -> None:
         for name in ("radius", "height"):
             object.__setattr__(self, name, as_number(getattr(self, name), name, positive=True, **SIZES))
-        if not as_flag(self.periodic, "periodic"):
-            raise ValueError("a cylinder with rims is not available yet; take Cylinder(..., periodic=True)")
+        as_flag(self.periodic, "periodic")
 
     @property
     def period(self) -> Floats | None:
-        """(∞, ∞, height)."""
-        return np.array([np.inf, np.inf, self.height])
+        """(∞, ∞, height) if periodic."""
+        return np.array([np.inf, np.inf, self.height]) if self.periodic else None
 
     @property
     def size(self) -> float:
@@ -94,9 +96,25 @@ class Cylinder(LevelSurface):
         return self.rolled(np.column_stack([sides, np.zeros(n)]))
 
     def triangulate(self, n_nodes: int) -> TriangleMesh:
-        """The flat torus's triangulation, rolled up."""
+        """The flat torus's triangulation, rolled up; rings from rim to rim if there are rims."""
         known: dict[int, TriangleMesh] = self.__dict__.setdefault("_meshes", {})
-        if n_nodes not in known:
+        if n_nodes not in known and not self.periodic:
+            known[n_nodes] = turned_mesh(self._radius, -0.5 * self.height, 0.5 * self.height, n_nodes)
+        elif n_nodes not in known:
             sheet = FlatTorus(2.0 * np.pi * self.radius, self.height).triangulate(n_nodes)
             known[n_nodes] = TriangleMesh(self.rolled(sheet.nodes), sheet.triangles, self.period)
         return known[n_nodes]
+
+    def _radius(self, z: Floats) -> Floats:
+        return np.full(len(z), self.radius)
+
+    def rim_loops(self) -> Sequence[Sequence[Floats]]:
+        """The two circles, unless the ends are joined."""
+        if self.periodic:
+            return ()
+        return turned_rims(self._radius, -0.5 * self.height, 0.5 * self.height, (False, False))
+
+    def beyond(self, points: Floats) -> Bools:
+        """|z| > height/2, unless the ends are joined."""
+        out: Bools = np.abs(points[:, 2]) > (np.inf if self.periodic else 0.5 * self.height)
+        return out

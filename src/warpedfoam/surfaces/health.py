@@ -303,7 +303,7 @@ def _least_angles(mesh: TriangleMesh) -> Floats:
 
 def _pinched(mesh: TriangleMesh) -> list[MeshFinding]:
     try:
-        mesh.require_closed_surface()
+        mesh.require_surface(closed=True)
     except MeshError as fault:
         return [MeshFinding("not a manifold", 1, "a node", str(fault), True)]
     return []

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpedfoam.arrays import Floats, Ints, as_generator, as_integer, as_points, frozen
+from warpedfoam.arrays import Bools, Floats, Ints, as_generator, as_integer, as_points, frozen
 from warpedfoam.errors import MeshError
 from warpedfoam.kernels import height_arcs as arcs
 from warpedfoam.kernels.fans import fan_integrals
@@ -22,6 +23,7 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.patches import PatchedMesh
 from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import ArcTerms, Layer
+from warpedfoam.surfaces.rim import Rim, with_walls
 
 #: Newton steps along a line to the surface, steps to the nearest point.
 LINE_STEPS, NEAREST_STEPS = 12, 200
@@ -34,7 +36,8 @@ class LevelSurface(ABC):
 
     A subclass provides `level`, `triangulate`, `size` and `euler_characteristic`; all else follows:
     n = ∇f/|∇f|, W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|. Films are `warpedfoam.kernels.height_arcs`, volumes
-    `warpedfoam.kernels.fans`, whole integrals are summed over a fine mesh.
+    `warpedfoam.kernels.fans`, whole integrals are summed over a fine mesh. A surface that ends somewhere
+    provides `rim_loops` too: f = 0 goes on a little beyond, the surface does not.
     """
 
     #: Squared share of the normal component below which a rigid motion is a symmetry.
@@ -64,6 +67,22 @@ class LevelSurface(ABC):
     def period(self) -> Floats | None:
         """It does not repeat."""
         return None
+
+    def rim_loops(self) -> Sequence[Sequence[Floats]]:
+        """Points along the smooth sides of each loop of the rim, see `Rim`; none for a closed surface."""
+        return ()
+
+    @cached_property
+    def rim(self) -> Rim | None:
+        """Where the surface ends, or None."""
+        loops = self.rim_loops()
+        return Rim(loops, lambda x: self.foot(x, self._unit(x)), self._unit) if len(loops) else None
+
+    def beyond(self, points: Floats) -> Bools:
+        """Which points of f = 0 lie beyond the rim: by its nearest point, unless a subclass knows better."""
+        if self.rim is None:
+            return np.zeros(len(points), dtype=np.bool_)
+        return self.rim.beyond(points)
 
     @property
     def precision(self) -> float:
@@ -103,12 +122,22 @@ class LevelSurface(ABC):
     def project(self, points: ArrayLike) -> Floats:
         """Nearest points of the surface: x = p − (p − x)·n n, then down to the surface, until it stays.
 
+        What lands beyond a rim goes to the rim.
+
         Raises
         ------
         ValueError
             If a point is so far away that it has no clear nearest point.
         """
-        p = as_points(points, "points", minimum=0)
+        found = self._nearest(as_points(points, "points", minimum=0))
+        if self.rim is not None and len(found):
+            far = self.beyond(found)
+            if far.any():
+                found[far] = self.rim.nearest(found[far])
+        return found
+
+    def _nearest(self, p: Floats) -> Floats:
+        """Nearest points of f = 0."""
         x = p.copy()
         live = np.arange(len(p))
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -199,7 +228,8 @@ class LevelSurface(ABC):
 
     @cached_property
     def _patches(self) -> PatchedMesh:
-        return PatchedMesh(self.triangulate(self.integral_nodes), self._settled, self._unit)
+        fine = self.triangulate(self.integral_nodes)
+        return PatchedMesh(fine, self._settled, self._unit, self.rim, self.beyond)
 
     @cached_property
     def _moments(self) -> tuple[float, float, float, float, float]:
@@ -267,6 +297,11 @@ class LevelSurface(ABC):
         spread = _generators(points - centre, self.size)[self._generators]
         across = np.einsum("anx,nx->an", spread, rule.normals)
         tangent = (across * weights) @ across.T
+        if self.rim is not None:
+            # a symmetry keeps the rim too
+            at, inward, share = self.rim.samples()
+            over = np.einsum("anx,nx->an", _generators(at - centre, self.size)[self._generators], inward)
+            tangent += (over * (share * weights.sum() / share.sum())) @ over.T
         whole = np.einsum("n,anx,bnx->ab", weights, spread, spread)
         root = np.linalg.inv(np.linalg.cholesky(whole))
         values, vectors = np.linalg.eigh(root @ tangent @ root.T)
@@ -360,10 +395,12 @@ class LevelSurface(ABC):
 
         back = (loops.halves & 1).astype(bool)[:, None]
         first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]
-        shifts = loop_shifts(np.where(back, last, first), np.where(back, first, last), loops, self.period)
-        return fan_integrals(
-            placed.rule, placed.points, loops, shifts, self.foot, land, self._unit, layer.rays
-        )
+        start, end = np.where(back, last, first), np.where(back, first, last)
+        shifts = loop_shifts(start, end, loops, self.period)
+        points = placed.points
+        if self.rim is not None:
+            points, loops = with_walls(self.rim, placed.rule, points, loops, start, end)
+        return fan_integrals(placed.rule, points, loops, shifts, self.foot, land, self._unit, layer.rays)
 
 
 def _normal_shape(gradient: Floats, second: Floats | None) -> tuple[Floats, Floats | None]:
@@ -411,7 +448,7 @@ def require_meshable(mesh: TriangleMesh, chi: int) -> TriangleMesh:
     MeshError
         If it is not: it was made too coarse for the surface.
     """
-    mesh.require_closed_surface()
+    mesh.require_surface(closed=True)
     if mesh.euler_characteristic != chi:
         raise MeshError(
             f"the triangulation has Euler characteristic {mesh.euler_characteristic}, the surface {chi}; "

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_indices, as_points, frozen
 from warpedfoam.errors import MeshError
+from warpedfoam.kernels.loops import loops_of
 from warpedfoam.kernels.periodic import nearest_image
 
 if TYPE_CHECKING:
@@ -116,20 +117,50 @@ class TriangleMesh:
         used = len(np.unique(self.triangles))
         return used - len(self.edges) + self.n_triangles
 
-    def require_closed_surface(self) -> None:
-        """Check that the mesh is one closed, consistently oriented manifold of proper triangles.
+    @cached_property
+    def rim_edges(self) -> Ints:
+        """Directed edges (k, 2) that only one triangle has, the surface on their left."""
+        start, end = self.triangles.ravel(), np.roll(self.triangles, -1, axis=1).ravel()
+        keys, reverse = start * self.n_nodes + end, end * self.n_nodes + start
+        alone = ~np.isin(keys, reverse)
+        out: Ints = frozen(np.stack([start[alone], end[alone]], axis=1))
+        return out
+
+    @cached_property
+    def rim_loops(self) -> tuple[Ints, ...]:
+        """Nodes along each loop of the rim, the surface on the left; of a mesh that passes `require_surface`."""
+        start, end = self.rim_edges.T
+        if not len(start):
+            return ()
+        place = np.full(self.n_nodes, -1)
+        place[start] = np.arange(len(start))
+        loops = loops_of(place[end], np.zeros(len(start), dtype=np.int64))
+        return tuple(frozen(start[part]) for part in np.split(loops.halves, loops.starts[1:]))
+
+    def require_surface(self, *, closed: bool = False) -> None:
+        """Check that the mesh is one consistently oriented manifold of proper triangles.
+
+        Parameters
+        ----------
+        closed : bool, optional
+            Whether rims are faults too.
 
         Raises
         ------
         MeshError
             With the first fault found: unreferenced nodes, coinciding nodes of a triangle, degenerate
-            triangles, edges with more than two triangles, flipped triangles, open edges, pinched
-            nodes, several components.
+            triangles, edges with more than two triangles, flipped triangles, pinched nodes, several
+            components; open edges if the mesh is to be closed.
         """
-        if self._checked:
-            return
-        _check_closed(self)
-        object.__setattr__(self, "_checked", True)
+        if not self._checked:
+            _check_manifold(self)
+            object.__setattr__(self, "_checked", True)
+        if closed and len(self.rim_edges):
+            a, b = self.rim_edges[0]
+            raise MeshError(
+                f"the mesh is open: {len(self.rim_edges)} rim edges (first: ({a}, {b})); "
+                "a closed surface is needed, fill the holes"
+            )
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Return the mesh as a ``trimesh.Trimesh``."""
@@ -154,7 +185,7 @@ def flat_triangles(mesh: TriangleMesh) -> Bools:
     return flat
 
 
-def _check_closed(mesh: TriangleMesh) -> None:
+def _check_manifold(mesh: TriangleMesh) -> None:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -187,22 +218,20 @@ def _check_closed(mesh: TriangleMesh) -> None:
             f"the two triangles at edge ({bad // n}, {bad % n}) are oriented against each other; "
             "flip one (warpedfoam check MESH --repair NEW.ply does)"
         )
-    if (uses == 1).any():
-        bad = int(undirected[uses == 1][0])
-        raise MeshError(
-            f"the mesh is open: {int((uses == 1).sum())} rim edges (first: ({bad // n}, {bad % n})); "
-            "a closed surface is needed, fill the holes"
-        )
     graph = coo_array((np.ones(len(start)), (start, end)), shape=(n, n))
     pieces, _ = connected_components(graph, directed=False)
     if pieces > 1:
         raise MeshError(f"the mesh has {pieces} separate components; keep one")
-    # a closed manifold has one fan of triangles per node: corners linked through shared edges
+    # a manifold has one fan of triangles per node: corners linked through shared edges
     corner = np.arange(3 * len(tri))
     following = np.roll(corner.reshape(-1, 3), -1, axis=1).ravel()
     order = np.argsort(keys)
-    twin = order[np.searchsorted(keys[order], end * n + start)]
-    links = coo_array((np.ones(len(corner)), (corner, following[twin])), shape=(len(corner),) * 2)
+    reverse = end * n + start
+    twin = order[np.minimum(np.searchsorted(keys[order], reverse), len(order) - 1)]
+    paired = keys[twin] == reverse
+    links = coo_array(
+        (np.ones(int(paired.sum())), (corner[paired], following[twin[paired]])), shape=(len(corner),) * 2
+    )
     fans, _ = connected_components(links, directed=False)
     if fans != n:
         raise MeshError("two sheets touch in a single node: the mesh is not a manifold; duplicate that node")

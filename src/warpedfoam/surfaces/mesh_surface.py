@@ -77,7 +77,7 @@ class MeshSurface(LevelSurface):
         fault = placement_fault(mesh)
         if fault:
             raise MeshError(fault)
-        mesh.require_closed_surface()
+        mesh.require_surface()
         object.__setattr__(self, "nodes", mesh.nodes)
         object.__setattr__(self, "triangles", mesh.triangles)
         self.__dict__["source"] = mesh

@@ -96,7 +96,7 @@ class NettedSurface(LevelSurface):
 
     def _evened(self, nodes: Floats, triangles: Ints) -> TriangleMesh:
         mesh = TriangleMesh(nodes, triangles, self.period)
-        mesh.require_closed_surface()
+        mesh.require_surface(closed=True)
         a, b = mesh.edges.T
         start, end = np.concatenate([a, b]), np.concatenate([b, a])
         degree = np.bincount(start, minlength=mesh.n_nodes)[:, None]

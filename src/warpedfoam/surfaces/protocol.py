@@ -17,6 +17,7 @@ from warpedfoam.arrays import Floats, Ints, frozen
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.quadrature import gauss
 from warpedfoam.surfaces.mesh import TriangleMesh
+from warpedfoam.surfaces.rim import Rim
 
 #: Range of the lengths that describe a surface: beyond it their powers leave floating point.
 SIZES = {"minimum": 1e-60, "maximum": 1e60}
@@ -97,6 +98,11 @@ class Surface(Protocol):
     @property
     def period(self) -> Floats | None:
         """Lengths (3,) after which the surface repeats along x, y, z, infinite where it does not; or None."""
+        ...
+
+    @property
+    def rim(self) -> Rim | None:
+        """Where the surface ends and films may, or None."""
         ...
 
     @property

@@ -1,34 +1,40 @@
-"""Surfaces of revolution that close on their axis, from a profile function."""
+"""Surfaces of revolution between poles or rims, from a profile function."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_floats, as_number
+from warpedfoam.arrays import Bools, Floats, as_floats, as_integer, as_number
+from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.netted import NettedSurface
+from warpedfoam.surfaces.turned import turned_mesh, turned_rims
 
 #: Heights at which the profile is looked at, step of its second derivative, error allowed to the first.
-LOOKS, STEP, SLOPE_ERROR = 400, 1e-5, 1e-4
+LOOKS, STEP, SLOPE_ERROR, POLE = 400, 1e-5, 1e-4, 1e-9
+#: How far the profile is followed beyond a rim, in heights.
+ROOM = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Revolution(NettedSurface):
-    """x² + y² = s(z) between two poles on the z axis; the gap lies outside.
+    """x² + y² = s(z) for heights from ``bottom`` to ``top``; the gap lies outside.
 
-    The *square* of the radius is given, since it stays smooth at the poles, where the radius does not:
-    a spheroid of semi-axes a, c has s(z) = a² (1 − z²/c²).
+    The *square* of the radius is given, since it stays smooth at a pole, where the radius does not:
+    a spheroid of semi-axes a, c has s(z) = a² (1 − z²/c²). Where s is 0 at an end there is a pole, where
+    it is above 0 a rim.
 
     Parameters
     ----------
     square : callable
-        s at heights (n,), returning (n,): 0 at both poles, above 0 between; smooth a little beyond them.
+        s at heights (n,), returning (n,): above 0 between the ends; smooth a little beyond them.
     slope : callable
         s', the same way.
     bottom, top : float
-        Heights of the poles.
+        Heights of the ends.
 
     Raises
     ------
@@ -60,8 +66,8 @@ class Revolution(NettedSurface):
         z = np.linspace(low, high, LOOKS + 1)
         found = self._s(z)
         most = float(found.max())
-        if not found[1:-1].min() > 0.0 or max(abs(found[0]), abs(found[-1])) > 1e-9 * most:
-            raise ValueError("square must be 0 at bottom and top and above 0 between: they are the poles")
+        if not found[1:-1].min() > 0.0 or min(found[0], found[-1]) < -POLE * most:
+            raise ValueError("square must be above 0 between bottom and top, and 0 or above there")
         h = STEP * (high - low)
         given = self._ds(z)
         off = np.abs((self._s(z + h) - self._s(z - h)) / (2.0 * h) - given)
@@ -70,14 +76,21 @@ class Revolution(NettedSurface):
             raise ValueError(
                 f"slope is not the derivative of square: at z = {z[bad]:.4g} it is off by {off[bad]:.3g}"
             )
-        if not (given[0] > 0.0 > given[-1]):
-            raise ValueError("slope must be above 0 at bottom and below 0 at top: the poles must be round")
+        low_pole, high_pole = self._poles
+        if (low_pole and not given[0] > 0.0) or (high_pole and not given[-1] < 0.0):
+            raise ValueError("slope must be above 0 at bottom and below 0 at top: a pole must be round")
 
     def _s(self, z: Floats) -> Floats:
         return as_floats(self.square(z.copy()), "square's values", (len(z),))
 
     def _ds(self, z: Floats) -> Floats:
         return as_floats(self.slope(z.copy()), "slope's values", (len(z),))
+
+    @cached_property
+    def _poles(self) -> tuple[bool, bool]:
+        """Which of the ends are poles."""
+        low, high = self._s(np.array([self.bottom, self.top])) <= POLE * self._reach**2
+        return bool(low), bool(high)
 
     @property
     def _reach(self) -> float:
@@ -97,13 +110,14 @@ class Revolution(NettedSurface):
 
     @property
     def euler_characteristic(self) -> int:
-        """χ = 2."""
-        return 2
+        """χ, the number of poles."""
+        return sum(self._poles)
 
     def level(self, points: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
-        """x² + y² − s(z); beyond the poles s goes on along a straight line."""
+        """x² + y² − s(z); beyond the poles, and a little beyond rims, s goes on along a straight line."""
         z = np.nan_to_num(points[:, 2], nan=self.bottom)
-        held = np.clip(z, self.bottom, self.top)
+        room = np.where(self._poles, 0.0, ROOM * (self.top - self.bottom))
+        held = np.clip(z, self.bottom - room[0], self.top + room[1])
         slope = self._ds(held)
         value = points[:, 0] ** 2 + points[:, 1] ** 2 - self._s(held) - slope * (z - held)
         gradient = np.stack([2.0 * points[:, 0], 2.0 * points[:, 1], -slope], axis=1)
@@ -114,3 +128,27 @@ class Revolution(NettedSurface):
         bend[:, 0, 0] = bend[:, 1, 1] = 2.0
         bend[:, 2, 2] = -(self._ds(held + h) - self._ds(held - h)) / (2.0 * h)
         return value, gradient, bend
+
+    def _radius(self, z: Floats) -> Floats:
+        out: Floats = np.sqrt(np.maximum(self._s(z), 0.0))
+        return out
+
+    def rim_loops(self) -> Sequence[Sequence[Floats]]:
+        """The circles at those ends that are no poles."""
+        return turned_rims(self._radius, self.bottom, self.top, self._poles)
+
+    def beyond(self, points: Floats) -> Bools:
+        """Below a rim at the bottom, above one at the top."""
+        low, high = self._poles
+        out: Bools = (points[:, 2] < self.bottom) & (not low) | (points[:, 2] > self.top) & (not high)
+        return out
+
+    def triangulate(self, n_nodes: int) -> TriangleMesh:
+        """A surface net if both ends are poles, rings if there are rims."""
+        if all(self._poles):
+            return super().triangulate(n_nodes)
+        count = as_integer(n_nodes, "n_nodes", minimum=50)
+        known: dict[int, TriangleMesh] = self.__dict__.setdefault("_meshes", {})
+        if count not in known:
+            known[count] = turned_mesh(self._radius, self.bottom, self.top, count, self._poles)
+        return known[count]

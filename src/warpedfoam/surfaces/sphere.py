@@ -69,6 +69,11 @@ class Sphere:
         return None
 
     @property
+    def rim(self) -> None:
+        """None: the surface is closed."""
+        return None
+
+    @property
     def precision(self) -> float:
         """Loop integrals are exact."""
         return 1e-6

@@ -1,7 +1,7 @@
 """Exact geodesic distances on triangle meshes, whole or on patches, and how far they are from the surface.
 
 Calls libigl, whose `exact_geodesic` ends the interpreter on bad meshes and gives 0 for nodes it never
-reached: meshes pass `require_closed_surface`, and patches are cut so that they are manifolds.
+reached: meshes pass `require_surface`, and patches are cut so that they are manifolds.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def exact_distances(mesh: TriangleMesh, sources: Ints | Floats, radius: float | 
     ConvergenceError
         If libigl leaves nodes out.
     """
-    mesh.require_closed_surface()
+    mesh.require_surface()
     if mesh.period is not None:
         half = 0.5 * float(np.min(mesh.period))
         if radius is None or radius >= half:

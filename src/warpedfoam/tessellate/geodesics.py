@@ -107,7 +107,7 @@ class HeatGeodesics:
         self, surface_or_mesh: Surface | TriangleMesh | trimesh.Trimesh, t: float | None = None
     ) -> None:
         self._mesh = as_mesh(surface_or_mesh)
-        self._mesh.require_closed_surface()
+        self._mesh.require_surface()
         self._t = _time(self._mesh, t)
         self._data = _factor(self._mesh, self._t)
         self._try_out()
@@ -250,7 +250,7 @@ def geodesic_distances(
     if t is not None:
         raise ValueError(f"t is for method='heat' only, got t = {t} with method='exact'")
     mesh = as_mesh(surface_or_mesh)
-    mesh.require_closed_surface()
+    mesh.require_surface()
     array = _as_array(sources)
     if array.dtype.kind != "f":
         return exact_distances(mesh, _source_nodes(array, mesh.n_nodes), radius)
@@ -393,7 +393,7 @@ def _digest(mesh: TriangleMesh) -> bytes:
 
 
 def _factor(mesh: TriangleMesh, t: float) -> Any:
-    """Factor with libigl; the mesh must have passed `require_closed_surface`.
+    """Factor with libigl; the mesh must have passed `require_surface`.
 
     The Laplacian is singular, and libigl relies on round-off to keep its last pivot from 0. A cube's
     or a regular tetrahedron's is exactly 0, so a second try moves the nodes by 1e-12 edges.
