@@ -27,6 +27,22 @@ MAX_ORDER = 24
 
 
 @dataclass(frozen=True, eq=False)
+class Walls:
+    """Arcs of the rim between neighbouring rim vertices, the surface on the left of each; arrays (n_walls,).
+
+    ``bubble`` ends there; ``tails`` and ``heads`` are the rim vertices; ``loop``, ``first`` and ``last``
+    their places on the surface's `Rim`.
+    """
+
+    bubble: Ints
+    tails: Ints
+    heads: Ints
+    loop: Ints
+    first: Floats
+    last: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Foam:
     """A foam one bubble thick: topology, vertex positions, film shapes and the volumes to hold.
 
@@ -111,6 +127,7 @@ class Foam:
                 f"{away.max():g} away; project them first (cell.surface.project)"
             )
         put(self, "vertex_points", frozen(points))
+        self._check_rim()
         if film_offsets is None:
             film_offsets = np.zeros((network.n_films, 3))
         offsets = as_floats(film_offsets, "film_offsets", (network.n_films, None))
@@ -150,6 +167,32 @@ class Foam:
             pressures = frozen(as_floats(pressures, "pressures", (network.n_bubbles,)))
         put(self, "pressures", pressures)
 
+    def _check_rim(self) -> None:
+        """Rim vertices lie on the rim, and walls go once round each of its loops."""
+        network, rim, size = self.network, self.cell.surface.rim, self.cell.surface.size
+        n_loops = 0 if rim is None else rim.n_loops
+        if len(network.rim_cycles) != n_loops:
+            raise TopologyError(
+                f"the network's walls make {len(network.rim_cycles)} loops, the surface's rim has {n_loops}"
+            )
+        if rim is None:
+            return
+        at = self.vertex_points[network.rim_vertices]
+        away = np.linalg.norm(rim.nearest(at) - at, axis=1)
+        if away.max() > 1e-9 * size:
+            raise ValueError(
+                f"rim vertices must lie on the rim, but vertex {int(network.rim_vertices[away.argmax()])} is "
+                f"{away.max():g} away"
+            )
+        walls = self.walls
+        for cycle in network.rim_cycles:
+            turns = (walls.last - walls.first)[cycle].sum() / rim.lengths[walls.loop[cycle[0]]]
+            if abs(turns - 1.0) > 1e-6 or len(np.unique(walls.loop[cycle])) > 1:
+                raise ValueError(
+                    "walls must follow each other round a loop of the rim, the surface on their left, but "
+                    f"the one of vertex {int(network.origin[network.walls[cycle[0]] ^ 1])} do not"
+                )
+
     @classmethod
     def from_loops(
         cls,
@@ -174,8 +217,11 @@ class Foam:
         """
         if not isinstance(cell, HeleShawCell):
             raise TypeError(f"cell must be a HeleShawCell, got {type(cell).__name__}")
-        network = network_from_loops(loops)
+        rim = cell.surface.rim
+        network = network_from_loops(loops, rims=rim is not None)
         points = cell.surface.project(as_points(vertex_points, "vertex_points"))
+        if rim is not None and len(points) == network.n_vertices:
+            points[network.rim_vertices] = rim.nearest(points[network.rim_vertices])
         n = as_integer(order, "order", minimum=2, maximum=MAX_ORDER) - 1
         return cls(cell, network, points, np.zeros((network.n_films, n)), target_volumes)
 
@@ -201,6 +247,42 @@ class Foam:
         if self.cell.surface.period is not None:
             head = tail + nearest_image(head - tail, self.cell.surface.period)
         return tail, head
+
+    @cached_property
+    def walls(self) -> Walls:
+        """The arcs of the rim on which bubbles end; none on a surface without rim."""
+        network, rim = self.network, self.cell.surface.rim
+        tails = network.origin[network.walls ^ 1]
+        heads = network.origin[network.next[network.walls]]
+        loop, first, last = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+        if rim is not None and len(tails):
+            loop, first, last = rim.spans(self.vertex_points[tails], self.vertex_points[heads])
+        bubble = network.bubble[network.walls]
+        return Walls(*(frozen(array) for array in (bubble, tails, heads, loop, first, last)))
+
+    @cached_property
+    def wall_turning(self) -> Floats:
+        """∮ κ_g ds along the walls of each bubble, corners included, (n_bubbles,)."""
+        rim, walls = self.cell.surface.rim, self.walls
+        turned = np.zeros(0) if rim is None else rim.turning(walls.loop, walls.first, walls.last)
+        return frozen(np.bincount(walls.bubble, turned, self.n_bubbles).astype(np.float64, copy=False))
+
+    def wall_points(self, k: int) -> tuple[Floats, Ints]:
+        """Points along the walls for drawing: (m, 3) with the wall of each, (m,), both ends left out.
+
+        About ``k`` on a bubble size, and the rim's corners.
+        """
+        rim, walls = self.cell.surface.rim, self.walls
+        if rim is None:
+            return np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+        wall, low, high = rim.pieces(walls.loop, walls.first, walls.last)
+        count = np.maximum(np.ceil((high - low) * (k / self.bubble_size)), 1.0).astype(np.int64)
+        piece = np.repeat(np.arange(len(wall)), count)
+        within = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+        u = low[piece] + within * ((high - low) / count)[piece]
+        inner = u > walls.first[wall[piece]]
+        at = rim.at(walls.loop[wall[piece]][inner], u[inner])
+        return at, wall[piece][inner]
 
     @cached_property
     def film_areas(self) -> Floats:
@@ -247,11 +329,25 @@ class Foam:
         if shifts is not None:
             middle = middle + shifts
         parts = np.hstack([weight * middle, sign * np.cross(middle, (head - tail)[film]), weight])
+        if len(self.walls.bubble):
+            parts = np.concatenate([parts, self._wall_parts()])
+            owner = np.concatenate([owner, self.walls.bubble])
         sums = np.stack([np.bincount(owner, part, minlength=count) for part in parts.T], axis=1)
         # a hair along the loop's vector area, so that a hemisphere has a centre too
         normal = sums[:, 3:6] / np.maximum(np.linalg.norm(sums[:, 3:6], axis=1, keepdims=True), 1e-300)
         mean = sums[:, :3] / sums[:, 6:] + 1e-3 * self.bubble_size * normal
         return frozen(self.cell.surface.project(mean))
+
+    def _wall_parts(self) -> Floats:
+        """Length times middle, middle × chord and length of each wall, (n_walls, 7)."""
+        rim, walls = self.cell.surface.rim, self.walls
+        assert rim is not None
+        wall, low, high = rim.pieces(walls.loop, walls.first, walls.last)
+        nodes, loop = lobatto(2), walls.loop[wall]
+        start, middle, end = rim.nodes(nodes, loop, low, high)
+        length = np.linalg.norm(end - start, axis=1)[:, None]
+        parts = np.hstack([length * middle, np.cross(middle, end - start), length])
+        return np.stack([np.bincount(wall, part, len(walls.bubble)) for part in parts.T], axis=1)
 
     @cached_property
     def loop_shifts(self) -> Floats | None:

@@ -18,26 +18,29 @@ from warpedfoam.surfaces.protocol import Surface
 
 @dataclass(frozen=True)
 class T1Event:
-    """One T1: which bubbles, where, and the energy of its five films just before and after.
+    """One T1: which bubbles, where, and the energy of its films just before and after.
+
+    At a wall a film is lost to the rim or pulled out of it: then one side has a single bubble.
 
     Attributes
     ----------
     iteration : int
         Newton step after which it was made.
     film : int
-        The film that turned.
-    losers, gainers : tuple of two int
-        Ids of the bubbles that lost a side and of those that gained one.
+        The film that turned; at a wall the one that was lost, as numbered before, or the new one.
+    losers, gainers : tuple of int
+        Ids of the bubbles that lost a side and of those that gained one (at a wall: whose charge rose
+        and fell).
     position : tuple of three float
         Middle of the film, on the inner plate.
     energy_before, energy_after : float
-        γ Σ areas of the film and its four neighbours, before any further relaxation.
+        γ Σ areas of the film and its neighbours, before any further relaxation.
     """
 
     iteration: int
     film: int
-    losers: tuple[int, int]
-    gainers: tuple[int, int]
+    losers: tuple[int, ...]
+    gainers: tuple[int, ...]
     position: tuple[float, float, float]
     energy_before: float
     energy_after: float
@@ -130,13 +133,13 @@ def _rewired(network: CellNetwork, sites: T1Sites) -> CellNetwork:
     return CellNetwork(following, origin, bubble, network.bubble_euler)
 
 
-def independent(sites: T1Sites, priority: Floats) -> Bools:
-    """A set of sites with no bubble in common: each has the greatest priority round its four bubbles."""
+def independent(bubbles: Ints, priority: Floats) -> Bools:
+    """A set of sites with no bubble in common: each has the greatest priority round its ``bubbles`` (k, m)."""
     rank = np.empty(len(priority), dtype=np.int64)
     rank[np.argsort(priority, kind="stable")] = np.arange(len(priority))
-    best = np.full(int(sites.bubbles.max(initial=-1)) + 1, -1, dtype=np.int64)
-    np.maximum.at(best, sites.bubbles, rank[:, None])
-    out: Bools = (best[sites.bubbles] == rank[:, None]).all(axis=1)
+    best = np.full(int(bubbles.max(initial=-1)) + 1, -1, dtype=np.int64)
+    np.maximum.at(best, bubbles, rank[:, None])
+    out: Bools = (best[bubbles] == rank[:, None]).all(axis=1)
     return out
 
 

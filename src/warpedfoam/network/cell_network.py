@@ -23,7 +23,9 @@ class CellNetwork:
 
     Film f has the half-films 2f and 2f + 1, so the twin of h is ``h ^ 1``. A half-film has its bubble
     on the left, starts at vertex ``origin[h]`` and is followed round its bubble by ``next[h]``. Three
-    films meet at a vertex; a *marker* vertex joins two and only divides a film.
+    films meet at a vertex; a *marker* vertex joins two and only divides a film; at a *rim vertex* a
+    single film ends on the surface's rim. ``next`` then jumps along the *wall*, the arc of the rim on
+    which the bubble ends, to the rim vertex where its next half-film starts. Walls are no films.
 
     Parameters
     ----------
@@ -119,7 +121,7 @@ class CellNetwork:
 
     @cached_property
     def vertex_degrees(self) -> Ints:
-        """Films at each vertex: 3, or 2 at a marker."""
+        """Films at each vertex: 3, or 2 at a marker, or 1 on a rim."""
         return frozen(np.bincount(self.origin, minlength=self.n_vertices))
 
     @cached_property
@@ -128,25 +130,57 @@ class CellNetwork:
         return frozen(np.flatnonzero(self.vertex_degrees == 2))
 
     @cached_property
+    def rim_vertices(self) -> Ints:
+        """The onefold vertices, on a rim."""
+        return frozen(np.flatnonzero(self.vertex_degrees == 1))
+
+    @cached_property
+    def walls(self) -> Ints:
+        """Half-films after which a wall follows, (n_walls,): it ends where the next half-film starts."""
+        ends = self.origin[np.arange(len(self.origin)) ^ 1]
+        return frozen(np.flatnonzero(self.vertex_degrees[ends] == 1))
+
+    @cached_property
+    def wall_counts(self) -> Ints:
+        """Walls of each bubble, (n_bubbles,)."""
+        return frozen(np.bincount(self.bubble[self.walls], minlength=self.n_bubbles))
+
+    @cached_property
+    def rim_cycles(self) -> tuple[Ints, ...]:
+        """Walls round each loop of the rim, as indices into ``walls``, in order."""
+        if not len(self.walls):
+            return ()
+        at = np.empty(self.n_vertices, dtype=np.int64)
+        at[self.origin[self.walls ^ 1]] = np.arange(len(self.walls))
+        after = at[self.origin[self.next[self.walls]]]
+        loops = loops_of(after, np.zeros(len(after), dtype=np.int64))
+        return tuple(frozen(part) for part in np.split(loops.halves, loops.starts[1:]))
+
+    @cached_property
     def loops(self) -> Loops:
         """Half-films round each bubble, bubble after bubble."""
         return loops_of(self.next, self.bubble)
 
     @cached_property
     def sides(self) -> Ints:
-        """Sides n of each bubble: corners where three films meet, (n_bubbles,)."""
+        """Sides n of each bubble: its films (markers not counted) and its walls, (n_bubbles,)."""
         corner = self.vertex_degrees[self.origin] == 3
-        return frozen(np.bincount(self.bubble[corner], minlength=self.n_bubbles))
+        corners = np.bincount(self.bubble[corner], minlength=self.n_bubbles)
+        return frozen(corners + 2 * self.wall_counts)
 
     @cached_property
     def charges(self) -> Ints:
-        """Topological charges q = 6 − n, (n_bubbles,); they add up to 6 χ if all bubbles are disks."""
-        return frozen(6 - self.sides)
+        """Topological charges q = 6 − films − 2 walls, (n_bubbles,): 6 − n inside.
+
+        They add up to 6 χ if all bubbles are disks. A wall counts twice since films meet it at 90°, not
+        120°: a bubble of three films and a wall is at home on a straight rim.
+        """
+        return frozen(6 - self.sides - self.wall_counts)
 
     @cached_property
     def euler_characteristic(self) -> int:
-        """χ = vertices − films + Σ bubble_euler, of the surface that the network fills."""
-        return self.n_vertices - self.n_films + int(self.bubble_euler.sum())
+        """χ = vertices − films − walls + Σ bubble_euler, of the surface that the network fills."""
+        return self.n_vertices - self.n_films - len(self.walls) + int(self.bubble_euler.sum())
 
     @cached_property
     def outgoing(self) -> Ints:
@@ -164,8 +198,9 @@ class CellNetwork:
         ------
         TopologyError
             Odd or no half-films; ``next`` not a permutation, or not staying on its bubble, or not
-            starting where the half-film ends; a vertex with fewer than two or more than three films,
-            or two fans of them; unused vertex or bubble numbers; a disk with several boundary loops.
+            starting where the half-film ends, unless both are rim vertices; a vertex without films or
+            with more than three, or two fans of them; unused vertex or bubble numbers; a disk with
+            several boundary loops; a wall from a vertex to itself.
         """
         count = len(self.next)
         if count == 0 or count % 2:
@@ -180,18 +215,24 @@ class CellNetwork:
             bad = int(np.flatnonzero(self.bubble[self.next] != self.bubble)[0])
             raise TopologyError(f"half-film {bad} and its next lie on different bubbles")
         twin = np.arange(count) ^ 1
-        if (self.origin[self.next] != self.origin[twin]).any():
-            bad = int(np.flatnonzero(self.origin[self.next] != self.origin[twin])[0])
-            raise TopologyError(f"half-film {bad} does not end where its next begins")
         degrees = self.vertex_degrees
-        if ((degrees != 2) & (degrees != 3)).any():
-            bad = int(np.flatnonzero((degrees != 2) & (degrees != 3))[0])
+        start, end = self.origin[self.next], self.origin[twin]
+        walled = (degrees[start] == 1) & (degrees[end] == 1)
+        if ((start != end) & ~walled).any():
+            bad = int(np.flatnonzero((start != end) & ~walled)[0])
+            raise TopologyError(f"half-film {bad} does not end where its next begins")
+        if ((degrees < 1) | (degrees > 3)).any():
+            bad = int(np.flatnonzero((degrees < 1) | (degrees > 3))[0])
             raise TopologyError(
-                f"vertex {bad} has {int(degrees[bad])} films; two (a marker) or three must meet"
+                f"vertex {bad} has {int(degrees[bad])} films; three must meet, two at a marker, one on a rim"
             )
+        if (walled & (start == end)).any():
+            bad = int(np.flatnonzero(walled & (start == end))[0])
+            raise TopologyError(f"the wall after half-film {bad} comes back to vertex {int(end[bad])}")
         around = self.next[twin]
         thrice = np.where(degrees[self.origin] == 3, around[around[around]], around[around])
         still = (thrice != np.arange(count)) | (around == np.arange(count))
+        still &= degrees[self.origin] > 1
         if still.any():
             raise TopologyError(
                 f"the films at vertex {int(self.origin[np.flatnonzero(still)[0]])} do not form one fan"

@@ -11,7 +11,7 @@ from warpedfoam.errors import TopologyError
 from warpedfoam.network.cell_network import CellNetwork
 
 
-def network_from_loops(loops: Sequence[Sequence[int]]) -> CellNetwork:
+def network_from_loops(loops: Sequence[Sequence[int]], *, rims: bool = False) -> CellNetwork:
     """Network whose bubble i has the vertices ``loops[i]``, counter-clockwise seen from outside.
 
     Each directed pair of neighbouring vertices must occur once, and its reverse once, in all loops
@@ -20,11 +20,14 @@ def network_from_loops(loops: Sequence[Sequence[int]]) -> CellNetwork:
     Parameters
     ----------
     loops : sequence of sequences of int
+    rims : bool, optional
+        Whether a pair may lack its reverse: it is then a wall, on the rim.
 
     Raises
     ------
     TopologyError
-        If a pair occurs twice, or lacks its reverse, or the result is not a network.
+        If a pair occurs twice, or lacks its reverse and there are no rims, or the result is not a
+        network.
 
     Examples
     --------
@@ -58,18 +61,26 @@ def network_from_loops(loops: Sequence[Sequence[int]]) -> CellNetwork:
         )
     place = np.minimum(np.searchsorted(keys[order], reverse), len(keys) - 1)
     twin = order[place]
-    if (keys[twin] != reverse).any():
-        bad = int(keys[np.flatnonzero(keys[twin] != reverse)[0]])
+    wall = keys[twin] != reverse
+    if wall.any() and not rims:
+        bad = int(keys[np.flatnonzero(wall)[0]])
         raise TopologyError(
             f"the film from vertex {bad // n} to {bad % n} has a bubble on one side only; "
             "the loops must close the surface"
         )
-    lead = position < twin
+    if wall.all():
+        raise TopologyError("loops has no films, only walls")
+    if (wall & wall[after]).any():
+        bad = int(end[np.flatnonzero(wall & wall[after])[0]])
+        raise TopologyError(f"no film ends at vertex {bad} on the rim; leave it out")
+    lead = (position < twin) & ~wall
     half = np.empty(len(start), dtype=np.int64)
     half[lead] = 2 * np.arange(int(lead.sum()))
     half[twin[lead]] = half[lead] + 1
-    following, origin, bubble = (np.empty(len(start), dtype=np.int64) for _ in range(3))
-    following[half] = half[after]
-    origin[half] = start
-    bubble[half] = np.repeat(np.arange(len(rings)), sizes)
+    film = ~wall
+    onward = np.where(wall[after], after[after], after)
+    following, origin, bubble = (np.empty(int(film.sum()), dtype=np.int64) for _ in range(3))
+    following[half[film]] = half[onward[film]]
+    origin[half[film]] = start[film]
+    bubble[half[film]] = np.repeat(np.arange(len(rings)), sizes)[film]
     return CellNetwork(following, origin, bubble)

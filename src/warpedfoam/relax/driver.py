@@ -12,10 +12,11 @@ from warpedfoam.arrays import as_flag, as_integer, as_number, frozen
 from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.kernels.condense import Condensed
 from warpedfoam.moves.t1 import T1Event
+from warpedfoam.relax.held import moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
 from warpedfoam.relax.result import Relaxation
-from warpedfoam.relax.sweep import plan_sweep, realigned, turned
+from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
 from warpedfoam.relax.system import (
     Linearised,
     Residuals,
@@ -26,6 +27,7 @@ from warpedfoam.relax.system import (
     one_ring,
     pinned_unknowns,
 )
+from warpedfoam.relax.wall_sweep import turned_walls
 
 #: Compressibility of the proximal steps, in ℓ³ w² / γ, and the largest share of a volume they correct.
 SOFTNESS, VOLUME_STEP = 0.02, 0.15
@@ -258,10 +260,7 @@ def _advance(run: _Run, step: Step) -> None:
     """Apply a step film by film limited, then turn and realign films."""
     clock = Stopwatch(run.system.timings)
     cell, length = run.system.cell, run.system.length
-    network = run.state.network
-    smaller = np.minimum(run.system.shares[network.left], run.system.shares[network.right])
-    scale = np.minimum(1.0, np.sqrt(smaller))
-    sweep = plan_sweep(cell, run.state, step, length, run.turns, scale, t1=run.t1)
+    sweep = plan_sweep(cell, run.state, step, length, run.turns, run.system.shares, t1=run.t1)
     limited = Step(step.vertices * sweep.limit[:, None], step.offsets, step.pressures)
     state = _moved(run, limited)
     if sweep.failing.size:
@@ -272,6 +271,19 @@ def _advance(run: _Run, step: Step) -> None:
         )
         run.events.extend(events)
         run.turns[sweep.turning] += 1
+    if sweep.walls is not None and len(sweep.walls.sites.film):
+        state, run.turns, events = turned_walls(
+            cell,
+            state,
+            sweep.walls,
+            length,
+            run.turns,
+            run.iteration,
+            run.foam.tension,
+            run.foam.bubble_ids,
+            LIMITS,
+        )
+        run.events.extend(events)
     run.state = state
     clock.lap("t1")
 
@@ -328,7 +340,7 @@ def _moved(run: _Run, step: Step) -> State:
     surface, length = run.system.cell.surface, run.system.length
     return State(
         state.network,
-        surface.retract(state.points, length * step.vertices),
+        moved_points(surface, state.network, state.points, length * step.vertices),
         state.offsets + step.offsets,
         state.pressures + step.pressures,
     )

@@ -11,7 +11,6 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.moves.t1 import (
     T1Event,
-    T1Sites,
     allowed,
     independent,
     lay_films,
@@ -20,6 +19,8 @@ from warpedfoam.moves.t1 import (
     rewire,
     t1_sites,
 )
+from warpedfoam.relax.held import moved_points
+from warpedfoam.relax.wall_sweep import WallLimits, WallSweep, plan_walls
 from warpedfoam.relax.system import State, Step
 
 #: A film turns if it would become shorter than this, in bubble sizes (0.1 makes T1s cycle).
@@ -28,13 +29,15 @@ SHORT = 0.02
 NEW_LENGTH = (0.03, 0.1)
 #: The pull on the new film must exceed the pull on the old one by this, and by this per earlier T1.
 PREFERENCE = (1e-3, 0.02)
+LIMITS = WallLimits(SHORT, PREFERENCE, NEW_LENGTH[0])
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
     """Films about to vanish, those among them that turn, and the limit on each vertex's step.
 
-    ``collapsing`` tells which of ``failing`` would lose more than half of their chord.
+    ``collapsing`` tells which of ``failing`` would lose more than half of their chord; ``walls`` what
+    turns at the rim.
     """
 
     failing: Ints
@@ -44,6 +47,7 @@ class Sweep:
     current: Floats
     limit: Floats
     scale: Floats
+    walls: WallSweep | None
 
 
 def plan_sweep(
@@ -52,19 +56,19 @@ def plan_sweep(
     step: Step,
     length: float,
     turns: Ints,
-    scale: Floats,
+    shares: Floats,
     *,
     t1: bool,
 ) -> Sweep:
     """Find films that the step would make vanish, and decide which of them turn.
 
-    A film fails if its chord would shrink below ``SHORT`` bubble sizes (times ``scale``, which is
-    less beside small bubbles) or reverse. It turns if the
-    pull of its neighbours on the turned film is greater than on it, ``turns`` counting its earlier
+    A film fails if its chord would shrink below ``SHORT`` bubble sizes (less beside small bubbles, whose
+    ``shares`` of the mean volume are below 1) or reverse. It turns if the pull of its neighbours on the turned film is greater than on it, ``turns`` counting its earlier
     T1s. All other films keep half of their chord.
     """
     network = state.network
-    moved = cell.surface.retract(state.points, length * step.vertices)
+    scale = np.minimum(1.0, np.sqrt(np.minimum(shares[network.left], shares[network.right])))
+    moved = moved_points(cell.surface, network, state.points, length * step.vertices)
     period = cell.surface.period
     old = nearest_image(state.points[network.heads] - state.points[network.tails], period)
     new = nearest_image(moved[network.heads] - moved[network.tails], period)
@@ -74,7 +78,7 @@ def plan_sweep(
     fails = ((now < SHORT * scale) & (now < was)) | reversed_
     shrink = np.where(reversed_, was + now, was - now)
     share = np.where(shrink > 0.5 * was, 0.5 * was / np.maximum(shrink, 1e-300), 1.0)
-    failing = np.flatnonzero(fails)
+    failing = vanishing = np.flatnonzero(fails)
     empty = np.zeros((0, 3))
     sites = t1_sites(network, failing)
     fine = allowed(network, sites)
@@ -89,14 +93,21 @@ def plan_sweep(
         wins = t1 & fine & (gain > PREFERENCE[0] + PREFERENCE[1] * turns[failing])
         if wins.any():
             chosen = np.flatnonzero(wins)
-            apart = independent(_only(sites, wins), gain[chosen])
+            apart = independent(sites.bubbles[chosen], gain[chosen])
             turning, along = failing[chosen[apart]], turned[chosen[apart]]
     collapsing = share[failing] < 1.0
     share[turning] = 1.0
+    walls = None
+    if t1:
+        busy = t1_sites(network, turning).bubbles
+        walls = plan_walls(cell, state, moved, vanishing, length, turns, shares, busy, LIMITS)
     limit = np.ones(network.n_vertices)
+    if walls is not None:
+        share[walls.sites.film[walls.sites.film >= 0] >> 1] = 1.0
+        limit = walls.limit
     np.minimum.at(limit, network.tails, share)
     np.minimum.at(limit, network.heads, share)
-    return Sweep(failing, collapsing, turning, along, current, limit, scale)
+    return Sweep(failing, collapsing, turning, along, current, limit, scale, walls)
 
 
 def realigned(cell: HeleShawCell, state: State, sweep: Sweep, length: float) -> State:
@@ -167,13 +178,3 @@ def _energies(cell: HeleShawCell, state: State, films: Ints) -> Floats:
     return out
 
 
-def _only(sites: T1Sites, keep: Bools) -> T1Sites:
-    return T1Sites(
-        sites.a[keep],
-        sites.c[keep],
-        sites.a0[keep],
-        sites.a1[keep],
-        sites.b0[keep],
-        sites.b1[keep],
-        sites.bubbles[keep],
-    )

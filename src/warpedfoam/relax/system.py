@@ -17,8 +17,8 @@ from warpedfoam.energy import film_terms
 from warpedfoam.foam import bubble_integrals
 from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
 from warpedfoam.kernels.quadrature import lobatto
-from warpedfoam.moves.t1 import outward_tangents
 from warpedfoam.network import CellNetwork
+from warpedfoam.relax.held import held_vertices, hold
 from warpedfoam.relax.linear import Factoriser
 from warpedfoam.relax.pattern import Pattern
 
@@ -141,9 +141,10 @@ class Linearised:
         self.hessian[:, :4] *= system.length
         self.volume[:4] *= system.length
         self.force[:4] *= system.length
-        if len(network.markers):
-            self._hold_markers()
-        if len(network.markers) or not system.invariant:
+        held = held_vertices(system.cell.surface, network, state.points, state.offsets)
+        if held is not None:
+            hold(held, network, system.length, (self.force, self.volume, self.hessian))
+        if held is not None or not system.invariant:
             # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
             modes = rigid_modes(system.cell, state)
             self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None
@@ -157,25 +158,6 @@ class Linearised:
         self.volume_fault = self.volumes - excess * system.shares
         relative = np.abs(self.volume_fault) / system.shares
         self.residuals = self._residuals(float(relative.max()))
-
-    def _hold_markers(self) -> None:
-        """Let markers move across their film only: sliding along it would exploit the quadrature."""
-        network = self.state.network
-        along = marker_tangents(self.system.cell, self.state)
-        where = np.full(network.n_vertices, -1)
-        where[network.markers] = np.arange(len(along))
-        for row, ends in ((0, network.tails), (2, network.heads)):
-            film = np.flatnonzero(where[ends] >= 0)
-            t = along[where[ends[film]]].T
-            project = np.eye(2)[..., None] - t[:, None] * t[None]
-            rows = slice(row, row + 2)
-            for array in (self.force, self.volume):
-                array[rows, film] = np.einsum("ijf,jf->if", project, array[rows, film])
-            hessian = self.hessian[:, :, film]
-            hessian[rows] = np.einsum("ijf,jkf->ikf", project, hessian[rows])
-            hessian[:, rows] = np.einsum("kjf,jif->kif", hessian[:, rows], project)
-            hessian[rows, rows] += 0.5 * t[:, None] * t[None]
-            self.hessian[:, :, film] = hessian
 
     def _residuals(self, volume_error: float) -> Residuals:
         network = self.state.network
@@ -241,29 +223,15 @@ def one_ring(network: CellNetwork, values: Floats) -> Floats:
     return out
 
 
-def marker_tangents(cell: HeleShawCell, state: State) -> Floats:
-    """Direction of the film at each marker, in the vertex frame: (n_markers, 2) unit vectors."""
-    network = state.network
-    markers = network.markers
-    order = np.argsort(network.origin, kind="stable")
-    first = order[np.searchsorted(network.origin[order], markers)]
-    halves = np.stack([first, network.next[first ^ 1]], axis=1)
-    tangents = outward_tangents(cell.surface, network, state.points, state.offsets, halves)
-    frames = cell.surface.vertex_frames(state.points[markers])
-    along = np.einsum("mij,mj->mi", frames, tangents[:, 0] - tangents[:, 1])
-    out: Floats = along / np.linalg.norm(along, axis=1, keepdims=True)
-    return out
-
-
 def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
-    """Rigid motions as vertex steps (k, 2 n_vertices), markers moving across their films only."""
+    """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do."""
     modes = cell.surface.rigid_motions(state.points)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
-    markers = state.network.markers
-    if len(markers):
-        along = marker_tangents(cell, state)
-        matrix[:, markers] -= np.einsum("kmi,mi,mj->kmj", matrix[:, markers], along, along)
+    held = held_vertices(cell.surface, state.network, state.points, state.offsets)
+    if held is not None:
+        across = held.directions
+        matrix[:, held.vertices] -= np.einsum("kmi,mi,mj->kmj", matrix[:, held.vertices], across, across)
     flat: Floats = matrix.reshape(len(modes), 2 * state.network.n_vertices)
     # a motion along the films alone has nothing left
     size = np.linalg.norm(flat, axis=1)

@@ -122,7 +122,7 @@ def voronoi_foam(
             f"n_nodes = {fixed} is too coarse for {count} bubbles; use at least {6 * count}, "
             f"better {NODES_PER_BUBBLE * count}"
         )
-    if cell.surface.euler_characteristic > 0 and count < 4:
+    if cell.surface.rim is None and cell.surface.euler_characteristic > 0 and count < 4:
         raise ResolutionError(
             f"n_bubbles must be at least 4 on a closed surface without handles, got {count}; "
             "two hemispheres and three lunes can be built with Foam.from_loops"
@@ -219,6 +219,8 @@ def _laid_out(
     share = np.where(sound, np.clip(gap_a / np.where(sound, total, 1.0), 0.0, 1.0), 0.5)
     edge = nearest_image(mesh.nodes[b] - mesh.nodes[a], mesh.period)
     crossings = surface.project(mesh.nodes[a] + share[:, None] * edge)
+    if surface.rim is not None:
+        vertices = np.concatenate([vertices, surface.rim.nearest(crossings[regions.rim_crossings])])
     tail, head = vertices[network.tails], vertices[network.heads]
     offsets = surface.arc_fit(tail, head, regions.film, crossings, order)
     chord = np.linalg.norm(nearest_image(head - tail, surface.period), axis=1)

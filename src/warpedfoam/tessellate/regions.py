@@ -19,12 +19,14 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 class RegionNetwork:
     """A network read off a mesh.
 
-    ``corners`` (n_vertices,) are the triangles of three labels, in vertex order; ``crossings`` (m, 2)
-    the two-coloured mesh edges and ``film`` (m,) the film each lies on.
+    ``corners`` (n_threefold,) are the triangles of three labels, in vertex order; then come the rim
+    vertices, on ``rim_crossings`` (k,) of the ``crossings`` (m, 2), the two-coloured mesh edges;
+    ``film`` (m,) is the film on which each of those lies.
     """
 
     network: CellNetwork
     corners: Ints
+    rim_crossings: Ints
     crossings: Ints
     film: Ints
 
@@ -119,7 +121,7 @@ def region_network(mesh: TriangleMesh, labels: Ints, count: int) -> RegionNetwor
     """Network of labelled regions, each of which must be a disk.
 
     The dual of a triangle mesh is threefold, so triangles of three labels are vertices and chains of
-    two-coloured edges between them are films.
+    two-coloured edges between them are films. A two-coloured edge of the mesh's rim is a rim vertex.
 
     Raises
     ------
@@ -133,7 +135,8 @@ def region_network(mesh: TriangleMesh, labels: Ints, count: int) -> RegionNetwor
         (corner[:, 0] != corner[:, 1]) & (corner[:, 1] != corner[:, 2]) & (corner[:, 2] != corner[:, 0])
     )
     vertices = np.flatnonzero(threefold)
-    if len(vertices) < 2:
+    on_rim, left_of, rim_after = _rim_crossings(mesh, labels)
+    if len(vertices) + len(on_rim) < 2:
         raise ResolutionError(
             f"{count} bubbles meet nowhere in threefold vertices; use more bubbles (at least 4 on a sphere)"
         )
@@ -149,13 +152,15 @@ def region_network(mesh: TriangleMesh, labels: Ints, count: int) -> RegionNetwor
     linked = place[pair][two[pair]].reshape(-1, 2)
     graph = coo_array((np.ones(len(linked)), (linked[:, 0], linked[:, 1])), shape=(len(keys),) * 2)
     _, chain = connected_components(graph, directed=False)
-    # ends of chains: the three edges of each threefold triangle
-    ends = chain[place[vertices]].ravel()
+    # ends of chains: the three edges of each threefold triangle, and those on the rim
+    rim_edge = mesh.rim_edges[on_rim]
+    rim_place = np.searchsorted(keys, rim_edge.min(axis=1) * n + rim_edge.max(axis=1))
+    ends = np.concatenate([chain[place[vertices]].ravel(), chain[rim_place]])
     order = np.argsort(ends, kind="stable")
     film_of, tally = np.unique(ends, return_counts=True)
     if (tally != 2).any():
         raise ResolutionError("a film has no two ends; use more mesh nodes (n_nodes)")
-    half = np.empty(3 * len(vertices), dtype=np.int64)
+    half = np.empty(len(ends), dtype=np.int64)
     half[order] = np.arange(len(order))
     film_index = np.full(int(chain.max()) + 1, -1, dtype=np.int64)
     film_index[film_of] = np.arange(len(film_of))
@@ -164,16 +169,38 @@ def region_network(mesh: TriangleMesh, labels: Ints, count: int) -> RegionNetwor
     # leaving the triangle through its edge i → j, the label at j is on the left
     corner_labels = corner[vertices]
     left = np.roll(corner_labels, -1, axis=1).ravel()
-    half_of = half.reshape(-1, 3)
+    half_of, half_rim = half[: 3 * len(vertices)].reshape(-1, 3), half[3 * len(vertices) :]
     origin = np.empty(len(half), dtype=np.int64)
     bubble = np.empty(len(half), dtype=np.int64)
     following = np.empty(len(half), dtype=np.int64)
-    origin[half] = np.repeat(np.arange(len(vertices)), 3)
-    bubble[half] = left
+    origin[half_of.ravel()] = np.repeat(np.arange(len(vertices)), 3)
+    origin[half_rim] = len(vertices) + np.arange(len(half_rim))
+    bubble[half_of.ravel()], bubble[half_rim] = left, left_of
     # arriving with bubble(i) on the left, go on through the edge before: k → i
     following[half_of ^ 1] = np.roll(half_of, 1, axis=1)
+    following[half_rim ^ 1] = half_rim[rim_after]
     network = CellNetwork(following, origin, bubble)
-    return RegionNetwork(network, vertices, crossing, film_index[chain])
+    return RegionNetwork(network, vertices, rim_place, crossing, film_index[chain])
+
+
+def _rim_crossings(mesh: TriangleMesh, labels: Ints) -> tuple[Ints, Ints, Ints]:
+    """Two-coloured edges of the rim, as indices (k,) into ``mesh.rim_edges``.
+
+    Also the label before each, which a film that leaves from there has on its left, and which of them
+    comes next along the rim.
+    """
+    start, end = labels[mesh.rim_edges].T.reshape(2, -1)
+    found = np.flatnonzero(start != end)
+    rank = np.full(len(mesh.rim_edges), -1)
+    rank[found] = np.arange(len(found))
+    place = np.full(mesh.n_nodes, -1)
+    place[mesh.rim_edges[:, 0]] = np.arange(len(mesh.rim_edges))
+    after = np.empty(len(found), dtype=np.int64)
+    for loop in mesh.rim_loops:
+        here = rank[place[loop]]
+        here = here[here >= 0]
+        after[here] = np.roll(here, -1)
+    return found, start[found], after
 
 
 def _require_disks(mesh: TriangleMesh, labels: Ints, count: int) -> None:
