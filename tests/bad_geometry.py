@@ -198,7 +198,6 @@ table(
     [
         (lambda: None, TypeError, "surface_or_mesh must be a Surface, a TriangleMesh or a trimesh.Trimesh"),
         (lambda: wf.Sphere, TypeError, "surface_or_mesh must be"),
-        (lambda: mesh_with(triangles=small().triangles[1:]), wf.MeshError, "the mesh is open: 3 rim edges"),
         (third_sheet, wf.MeshError, "belongs to more than two triangles: the mesh is not a manifold"),
         (two_spheres, wf.MeshError, "the mesh has 2 separate components; keep one"),
         (lambda: mesh_with(np.zeros((0, 3))), ValueError, "nodes must hold at least 3 points, got 0"),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from warpedfoam import (
+    Catenoid,
     Cylinder,
     Ellipsoid,
     FlatTorus,
@@ -81,7 +82,29 @@ class Member:
     symmetries: int
     error: float
 
+    @property
+    def rim_turning(self):
+        """∮ κ_g ds along all rims, corners included."""
+        rim = self.surface.rim
+        if rim is None:
+            return 0.0
+        loops = np.arange(rim.n_loops)
+        return float(rim.turning(loops, np.zeros(len(loops)), rim.lengths).sum())
 
+
+def frustum():
+    """A bowl of a mesh: the lower part of a spheroid, its rim's nodes shaken along the rim."""
+    bowl = Revolution(lambda z: 4.0 * (1.0 - z**2 / 9.0), lambda z: -8.0 * z / 9.0, -3.0, 1.0)
+    mesh = bowl.triangulate(2500)
+    rng = np.random.default_rng(0)
+    nodes = mesh.nodes + 0.2 * mesh.mean_edge * rng.uniform(-1.0, 1.0, mesh.nodes.shape)
+    at = np.unique(mesh.rim_edges)
+    nodes = bowl.project(nodes)
+    nodes[at] = bowl.rim.slide(mesh.nodes[at], 0.2 * mesh.mean_edge * rng.uniform(-1.0, 1.0, len(at)))
+    return MeshSurface(nodes, mesh.triangles), bowl
+
+
+SHELL, BOWL = frustum()
 FAMILY = {
     "ball": Member(Ellipsoid(1.0, 1.0, 1.0), Sphere(1.0), 2, 3, 1e-12),
     "egg": Member(Ellipsoid(1.0, 1.2, 1.5), None, 2, 0, 1e-12),
@@ -93,10 +116,17 @@ FAMILY = {
     "hills": Member(Graph(hill_height, hill_slope, 8.0, 6.0, periodic=True), None, 0, 0, 1e-8),
     "crystal": Member(SchwarzP(6.0), None, -4, 0, 1e-12),
     "mesh": Member(MeshSurface(*jittered(Torus(RING, TUBE), 3000)), Torus(RING, TUBE), 0, 1, 2e-3),
+    "pipe": Member(Cylinder(1.5, 4.0), None, 0, 1, 1e-12),
+    "waist": Member(Catenoid(1.0, 2.0), None, 0, 1, 1e-9),
+    "bowl": Member(BOWL, None, 1, 1, 1e-9),
+    "funnel": Member(Revolution(vase_square, vase_slope, -2.0, 2.5), None, 0, 1, 1e-9),
+    "patch": Member(Graph(hill_height, hill_slope, 5.0, 4.0), None, 1, 0, 1e-8),
+    "plate": Member(Graph(hill_height, hill_slope, 5.0, 5.0, disk=True), None, 1, 0, 1e-8),
+    "shell": Member(SHELL, BOWL, 1, 1, 2e-3),
 }
 
 #: Bubbles that resolve the narrow ones.
-COUNTS = {"vase": 200, "ring": 240, "mesh": 160, "crystal": 200, "tube": 240, "hills": 240}
+COUNTS = {"vase": 200, "ring": 240, "mesh": 160, "crystal": 200, "tube": 240, "hills": 240, "patch": 60, "plate": 60}
 
 each_member = pytest.mark.parametrize("member", FAMILY.values(), ids=FAMILY)
 formulas = pytest.mark.parametrize(

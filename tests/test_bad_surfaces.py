@@ -16,6 +16,8 @@ BOX = [[-1.5] * 3, [1.5] * 3]
 K = 2.0 * np.pi / 10.0
 RING = wf.Torus(20.0, 4.0).triangulate(1000)
 NODES, TRIANGLES = RING.nodes, RING.triangles
+#: Points on a cylinder of radius 2, the last one beyond its rim.
+OVER = [[2.0, 0.0, -2.0], [-2.0, 0.0, 0.0], [0.0, 2.0, 1.0], [0.0, -2.0, 3.0]]
 TUBE, FLAT, UNIT = wf.Cylinder(1.0, 5.0, True), wf.FlatTorus(2.0, 2.0), wf.SchwarzP(2.0)
 
 
@@ -47,8 +49,8 @@ def implicit(function=ball, gradient=ball_slope, box=BOX, hessian=None):
     return wf.Implicit(function, gradient, box, hessian=hessian)
 
 
-def graph(function=hills, gradient=hills_slope, width=10.0, height=10.0):
-    return wf.Graph(function, gradient, width, height, periodic=True)
+def graph(function=hills, gradient=hills_slope, width=10.0, height=10.0, **more):
+    return wf.Graph(function, gradient, width, height, periodic=True, **more)
 
 
 def revolution(square=egg, slope=egg_slope, bottom=-3.0, top=3.0):
@@ -120,7 +122,8 @@ ROWS: list[Row] = [
         "hessian's values must have shape",
     ),
     # graphs and turned profiles
-    ("rims", lambda: wf.Graph(hills, hills_slope, 10.0, 10.0), V, r"take Graph\(..., periodic=True\)"),
+    ("periodic disk", lambda: graph(disk=True), V, "a disk is not periodic"),
+    ("oval disk", lambda: wf.Graph(hills, hills_slope, 10.0, 9.0, disk=True), V, "both its diameter"),
     ("wrong period", lambda: graph(width=9.0), V, "function does not repeat after"),
     (
         "turned slope",
@@ -147,7 +150,10 @@ ROWS: list[Row] = [
     ),
     ("wrong slope", lambda: revolution(slope=lambda z: -egg_slope(z)), V, "slope is not the derivative"),
     # surfaces with formulas, seeds on them
-    ("tube with rims", lambda: wf.Cylinder(1.0, 5.0), V, r"take Cylinder\(..., periodic=True\)"),
+    ("long catenoid", lambda: wf.Catenoid(1.0, 25.0), V, "height must be at most 20 neck radii"),
+    ("no neck", lambda: wf.Catenoid(0.0, 5.0), V, "neck_radius must be"),
+    ("word for periodic", lambda: wf.Cylinder(1.0, 5.0, periodic="no"), T, "periodic"),
+    ("seed beyond a rim", lambda: foam(wf.Cylinder(2.0, 5.0), seeds=OVER), V, "is 0.5 off it"),
     ("tube, 3 bubbles", lambda: foam(TUBE, 3), R, "would not be disks"),
     ("NaN axis", lambda: wf.Ellipsoid(1.0, np.nan, 1.0), V, "b must be finite"),
     ("needle", lambda: wf.voronoi_foam(wf.HeleShawCell(wf.Ellipsoid(1.0, 1.0, 1e3), 1e-6), 60), R, "too few"),
@@ -179,7 +185,7 @@ ROWS: list[Row] = [
     ),
     ("too polydisperse", lambda: foam(FLAT, 60, volumes=50.0, cells="power"), V, "must be at most 1"),
     # meshes
-    ("a hole", lambda: wf.MeshSurface(NODES, TRIANGLES[1:]), M, "fill the holes"),
+    ("a hole", lambda: foam(wf.MeshSurface(NODES, TRIANGLES[1:]), 60), R, "close those that are damage"),
     (
         "a triangle turned",
         lambda: wf.MeshSurface(NODES, np.vstack([TRIANGLES[:1, ::-1], TRIANGLES[1:]])),

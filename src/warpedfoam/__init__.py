@@ -37,11 +37,12 @@ from warpedfoam.io import (
     write_ply,
     write_record,
 )
-from warpedfoam.moves import T1Event, t1
+from warpedfoam.moves import T1Event, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import plot_foam, save_picture
 from warpedfoam.relax import Relaxation, relax
 from warpedfoam.surfaces import (
+    Catenoid,
     Cylinder,
     Ellipsoid,
     FlatTorus,
@@ -69,6 +70,7 @@ from warpedfoam.tessellate import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "Catenoid",
     "CellNetwork",
     "ConvergenceError",
     "Cylinder",
@@ -111,6 +113,7 @@ __all__ = [
     "side_distribution",
     "t1",
     "voronoi_foam",
+    "wall_t1",
     "write_bubbles_csv",
     "write_films_csv",
     "write_ply",

@@ -21,6 +21,10 @@ class EquilibriumReport:
         Angles between neighbouring films in the tangent plane, radians.
     angle_error : float
         Largest |angle − 2π/3|.
+    wall_angles : (n_rim_vertices,) array
+        Angles between films and the walls on which they end, in the order of ``network.rim_vertices``.
+    wall_error : float
+        Largest |wall angle − π/2|; 0 without rims.
     geodesic_curvatures : (n_films,) array
         Length-weighted mean κ_g of each film, positive where its left bubble is convex.
     curvature_spread : (n_films,) array
@@ -28,13 +32,15 @@ class EquilibriumReport:
     laplace_error : float or None
         Largest |κ_g − (p_left − p_right)/γ|; None if the foam has no pressures.
     pressure_identity : (n_bubbles,) array or None
-        Σ_j (p_i − p_j) ℓ_ij / γ − [(π/3)(6 − n_i) − ∫_i G dA] of each bubble.
+        Σ_j (p_i − p_j) ℓ_ij / γ − [(π/3) q_i − ∫_i G dA − ∫ κ_g ds along its walls] of each bubble.
     identity_error : float or None
         Largest |pressure_identity|.
     """
 
     vertex_angles: Floats
     angle_error: float
+    wall_angles: Floats
+    wall_error: float
     geodesic_curvatures: Floats
     curvature_spread: Floats
     laplace_error: float | None
@@ -45,8 +51,9 @@ class EquilibriumReport:
 def equilibrium_report(foam: Foam) -> EquilibriumReport:
     """Measure vertex angles, geodesic curvatures, Laplace's law and the pressure identity.
 
-    At equilibrium films meet at 120°, κ_g is constant along a film and equals (p_i − p_j)/γ, and
-    by Gauss–Bonnet Σ_j (p_i − p_j) ℓ_ij/γ = (π/3)(6 − n_i) − ∫_i G dA for every bubble. These hold
+    At equilibrium films meet at 120° and walls at 90°, κ_g is constant along a film and equals
+    (p_i − p_j)/γ, and by Gauss–Bonnet Σ_j (p_i − p_j) ℓ_ij/γ = (π/3) q_i − ∫_i G dA − ∫ κ_g ds along its
+    walls for every bubble, with the charge q_i = 6 − films − 2 walls. These hold
     as the gap goes to 0 (and the angles at any gap on a sphere); at a gap d the ruled film makes
     them off by the order of d times the curvature.
 
@@ -96,6 +103,14 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
     sine = np.einsum("vx,vkx->vk", here, np.cross(a, b))
     angles = np.mod(np.arctan2(sine, np.einsum("vkx,vkx->vk", a, b)), 2.0 * np.pi)
 
+    walls = np.zeros(0)
+    if surface.rim is not None:
+        leaving = np.argsort(network.origin, kind="stable")
+        leaving = leaving[np.searchsorted(network.origin[leaving], network.rim_vertices)]
+        along = surface.rim.frame(*surface.rim.locate(foam.vertex_points[network.rim_vertices]))[0]
+        cosine = np.einsum("vx,vx->v", tangent[leaving], along)
+        walls = np.arccos(np.clip(cosine, -1.0, 1.0))
+
     laplace, identity, worst = None, None, None
     if foam.pressures is not None:
         drop = (foam.pressures[network.left] - foam.pressures[network.right]) / foam.tension
@@ -104,11 +119,14 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
         count = network.n_bubbles
         total = np.bincount(network.left, pull, minlength=count)
         total -= np.bincount(network.right, pull, minlength=count)
-        identity = frozen(total - (np.pi / 3.0 * network.charges - foam.bubble_curvatures))
+        bend = foam.bubble_curvatures + foam.wall_turning
+        identity = frozen(total - (np.pi / 3.0 * network.charges - bend))
         worst = float(np.abs(identity).max())
     return EquilibriumReport(
         frozen(angles),
         float(np.abs(angles - 2.0 * np.pi / 3.0).max(initial=0.0)),
+        frozen(walls),
+        float(np.abs(walls - 0.5 * np.pi).max(initial=0.0)),
         frozen(mean),
         frozen(spread),
         laplace,

@@ -74,7 +74,7 @@ def _new_file(name: str) -> Path:
 
 
 def _described(name: str, report: MeshReport) -> str:
-    handles = (2 - report.euler_characteristic) // 2
+    handles = (2 - report.euler_characteristic - report.rims) // 2
     lines = [
         f"mesh      {name}: {report.n_nodes} nodes, {report.n_triangles} triangles, area {report.area:.6g}, "
         f"mean edge {report.mean_edge:.3g}, least angle {report.least_angle:.1f} degrees",

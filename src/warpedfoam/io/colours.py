@@ -73,7 +73,7 @@ def bubble_colours(foam: Foam, color_by: str = "charge") -> BubbleColours:
     elif name == "sides":
         values, label = foam.network.sides.astype(np.float64), "sides n"
     else:
-        values, label = foam.network.charges.astype(np.float64), "charge q = 6 − n"
+        values, label = foam.network.charges.astype(np.float64), "charge q"
     low, high = float(values[inside].min()), float(values[inside].max())
     rgb = charge_rgb(values) if name == "charge" else ramp_rgb(values, (low, high))
     rgb[~inside] = as_rgb(OUTSIDE_COLOUR)

@@ -130,12 +130,37 @@ def loop_points(foam: Foam, along: FilmPoints) -> tuple[Floats, Ints, Ints, Ints
     network, chains = foam.network, along.chains
     loops = network.loops
     film, back = loops.halves >> 1, (loops.halves & 1).astype(bool)
-    rows = np.where(back[:, None], chains[film, ::-1], chains[film])[:, :-1]
+    rows = np.where(back[:, None], chains[film, ::-1], chains[film])
+    if len(network.walls):
+        return _with_walls(foam, along.points, rows)
+    rows = rows[:, :-1]
     points, places = along.points, rows.ravel()
     if foam.loop_shifts is not None:
         shifts = np.repeat(foam.loop_shifts, rows.shape[1], axis=0)
         points, places = _with_images(points, places, shifts, foam.bubble_size)
     return points, places, loops.sizes * rows.shape[1], network.bubble[loops.halves[loops.starts]]
+
+
+def _with_walls(foam: Foam, points: Floats, rows: Ints) -> tuple[Floats, Ints, Ints, Ints]:
+    """As `loop_points`, where loops go on along the rim; ``rows`` are the points of their half-films."""
+    network, loops = foam.network, foam.network.loops
+    on_wall, wall = foam.wall_points(rows.shape[1] - 1)
+    n_halves, k = rows.shape
+    half = np.full(2 * network.n_films, -1)
+    half[loops.halves] = np.arange(n_halves)
+    # the last point of a half-film is the first of the next, unless a wall lies between
+    before_wall = np.zeros(n_halves, dtype=bool)
+    before_wall[half[network.walls]] = True
+    keep = np.ones(rows.shape, dtype=bool)
+    keep[:, -1] = before_wall
+    row, column = np.nonzero(keep)
+    places = np.concatenate([rows[keep], len(points) + np.arange(len(on_wall))])
+    owner = np.concatenate([row, half[network.walls][wall]])
+    rank = np.concatenate([column, k + np.arange(len(on_wall))])
+    order = np.lexsort((rank, owner))
+    count = np.add.reduceat(np.bincount(owner, minlength=n_halves), loops.starts)
+    bubble = network.bubble[loops.halves[loops.starts]]
+    return np.concatenate([points, on_wall]), places[order], count, bubble
 
 
 def bubble_patches(foam: Foam, *, curve_points: int = 9, rings: int = 4, rim_width: float = 0.0) -> Patches:

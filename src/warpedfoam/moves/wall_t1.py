@@ -51,11 +51,13 @@ def wall_sites(network: CellNetwork, walls: Ints) -> WallSites:
 
 
 def wall_allowed(network: CellNetwork, sites: WallSites) -> Bools:
-    """Whether each leaves a network: three different disks, threefold inner vertex, no film to itself."""
+    """Whether each leaves a network: three different disks, losers of at least four sides, no marker."""
     ordered = np.sort(sites.bubbles, axis=1)
     fine = (np.diff(ordered, axis=1) > 0).all(axis=1)
     fine &= (network.bubble_euler[sites.bubbles] == 1).all(axis=1)
     fine &= (sites.before >> 1) != (sites.after >> 1)
+    sides = network.sides[sites.bubbles]
+    fine &= np.where(sites.film >= 0, sides[:, :2].min(axis=1), sides[:, 2]) >= 4
     degrees = network.vertex_degrees[network.origin[sites.before]]
     out: Bools = fine & (degrees == np.where(sites.film >= 0, 3, 1))
     return out
@@ -76,7 +78,7 @@ def rewire_walls(network: CellNetwork, sites: WallSites) -> tuple[CellNetwork, I
     if not fine.all():
         raise TopologyError(
             f"site {int(np.flatnonzero(~fine)[0])} at the wall cannot turn: its three bubbles must be different "
-            "disks, and the vertex inside threefold"
+            "disks, those that lose a film or a wall must have at least four sides, and there must be no marker"
         )
     if len(np.unique(sites.bubbles)) != sites.bubbles.size:
         raise TopologyError("two of the T1s at walls share a bubble; make them one after the other")
@@ -131,7 +133,8 @@ def lay_walls(
 ) -> tuple[Floats, Floats]:
     """Points and offsets (of the films as they were) for the network after the T1s.
 
-    New walls and films are ``span`` (k,) long, about the middle of what was lost; neighbours straight.
+    New walls and films are ``span`` (k,) long, about the middle of what was lost; neighbours straight. A
+    new wall takes no more than a third of the ones beside it.
     """
     rim = surface.rim
     assert rim is not None
@@ -142,8 +145,13 @@ def lay_walls(
     h = sites.film[lost]
     foot, inner = network.origin[h ^ 1], network.origin[h]
     loop, u = rim.locate(points[foot])
+    back = np.empty_like(network.next)
+    back[network.next] = np.arange(len(back))
+    _, first, last = rim.spans(points[network.origin[back[h ^ 1] ^ 1]], points[foot])
+    _, start, end = rim.spans(points[foot], points[network.origin[network.next[h]]])
     half = 0.5 * span[lost] / rim.frame(loop, u)[2]
-    moved[foot], moved[inner] = rim.at(loop, u - half), rim.at(loop, u + half)
+    moved[foot] = rim.at(loop, u - np.minimum(half, (last - first) / 3.0))
+    moved[inner] = rim.at(loop, u + np.minimum(half, (end - start) / 3.0))
     one, other = network.origin[sites.before[~lost]], network.origin[sites.after[~lost]]
     loop, first, last = rim.spans(points[one], points[other])
     middle = 0.5 * (first + last)

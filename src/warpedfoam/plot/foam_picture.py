@@ -188,7 +188,8 @@ def _paint(
     normals = view.project(surface.normals(patches.points))[patches.triangles].mean(axis=1)
     front = facing(corners) > 0.0
     # of a surface with edges in the picture the back is seen too: paler, lit as if turned round
-    seen = front if surface.period is None else np.ones(len(corners), dtype=bool)
+    edged = surface.period is not None or surface.rim is not None
+    seen = np.ones(len(corners), dtype=bool) if edged else front
     corners, normals, front = corners[seen], normals[seen], front[seen]
     fill = colours.rgb[patches.triangle_bubble[seen]] / 255.0
     fill = np.where(front[:, None], fill, BACK_SHARE * fill + (1.0 - BACK_SHARE) * BACK_GREY)
@@ -201,7 +202,7 @@ def _paint(
         curves = curves[film] + foam.loop_shifts[:, None]
     middles = 0.5 * (curves[:, 1:] + curves[:, :-1]).reshape(-1, 3)
     towards = view.project(surface.normals(middles))[:, 2] > 0.0
-    if surface.period is not None:
+    if edged:
         towards[:] = True
     flat = view.project(curves)
     pieces = np.stack([flat[:, :-1], flat[:, 1:]], axis=2).reshape(-1, 2, 3)[towards]
@@ -257,7 +258,10 @@ def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
     """One entry per number of sides that occurs, with how many bubbles have it."""
     from matplotlib.patches import Patch
 
-    sides, counts = np.unique(foam.network.sides[colours.inside], return_counts=True)
+    # away from walls a bubble of n sides has the charge 6 − n; at them both do not go together
+    walled = len(foam.network.walls) > 0
+    found = 6 - foam.network.charges if colours.name == "charge" else foam.network.sides
+    sides, counts = np.unique(found[colours.inside], return_counts=True)
     by_charge = colours.name == "charge"
     entries: list[tuple[Floats, str]] = []
     rgb = (
@@ -270,16 +274,21 @@ def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
         same = ends == end
         least, most = int(sides[same].min()), int(sides[same].max())
         name = f"n = {least}" if least == most else f"n = {least} … {most}"
-        if by_charge:
+        if by_charge and walled:
+            name = f"q = {_signed(6 - least)}" + ("" if least == most else f" … {_signed(6 - most)}")
+        elif by_charge:
             charge = f"q = {_signed(6 - least)}"
             name += f"  ({charge})" if least == most else f"  ({charge} … {_signed(6 - most)})"
         entries.append((rgb[same][0] / 255.0, f"{name}:  {int(counts[same].sum())}"))
     outside = int((~colours.inside).sum())
     if outside:
         entries.append((as_rgb(OUTSIDE_COLOUR) / 255.0, f"exterior:  {outside}"))
+    title = "sides n, charge q = 6 − n:  bubbles" if by_charge else "sides n:  bubbles"
+    if by_charge and walled:
+        title = "charge q = 6 − films − 2 walls:  bubbles"
     figure.legend(
         handles=[Patch(facecolor=tuple(c), edgecolor="#555555", linewidth=0.6, label=t) for c, t in entries],
-        title="sides n, charge q = 6 − n:  bubbles" if by_charge else "sides n:  bubbles",
+        title=title,
         loc="outside right center",
         frameon=False,
         fontsize=11,

@@ -27,7 +27,7 @@ from warpedfoam.relax.system import (
     one_ring,
     pinned_unknowns,
 )
-from warpedfoam.relax.wall_sweep import turned_walls
+from warpedfoam.relax.wall_sweep import stood_up, turned_walls
 
 #: Compressibility of the proximal steps, in ℓ³ w² / γ, and the largest share of a volume they correct.
 SOFTNESS, VOLUME_STEP = 0.02, 0.15
@@ -271,6 +271,8 @@ def _advance(run: _Run, step: Step) -> None:
         )
         run.events.extend(events)
         run.turns[sweep.turning] += 1
+    if sweep.walls is not None:
+        state = stood_up(cell, state, sweep.walls, length)
     if sweep.walls is not None and len(sweep.walls.sites.film):
         state, run.turns, events = turned_walls(
             cell,

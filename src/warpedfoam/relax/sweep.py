@@ -97,16 +97,15 @@ def plan_sweep(
             turning, along = failing[chosen[apart]], turned[chosen[apart]]
     collapsing = share[failing] < 1.0
     share[turning] = 1.0
-    walls = None
-    if t1:
-        busy = t1_sites(network, turning).bubbles
-        walls = plan_walls(cell, state, moved, vanishing, length, turns, shares, busy, LIMITS)
+    busy = t1_sites(network, turning).bubbles
+    walls = plan_walls(cell, state, moved, vanishing, length, turns, shares, busy, LIMITS, t1=t1)
     limit = np.ones(network.n_vertices)
     if walls is not None:
         share[walls.sites.film[walls.sites.film >= 0] >> 1] = 1.0
-        limit = walls.limit
     np.minimum.at(limit, network.tails, share)
     np.minimum.at(limit, network.heads, share)
+    if walls is not None:
+        limit = walls.apart(limit)
     return Sweep(failing, collapsing, turning, along, current, limit, scale, walls)
 
 

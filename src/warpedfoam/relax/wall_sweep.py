@@ -22,6 +22,10 @@ from warpedfoam.moves.wall_t1 import (
 from warpedfoam.relax.system import State
 
 
+#: Rounds in which steps are lessened where walls shrink too fast.
+ROUNDS = 8
+
+
 @dataclass(frozen=True, eq=False)
 class WallLimits:
     """When things at walls turn.
@@ -37,11 +41,37 @@ class WallLimits:
 
 @dataclass(frozen=True, eq=False)
 class WallSweep:
-    """T1s at walls that are to be made, and how far vertices (n_vertices,) may go."""
+    """T1s at walls that are to be made.
+
+    ``kept`` are half-films to the rim that fail but are pulled away from it, and ``least`` (k,) how short
+    they may be, in bubble sizes. ``ends`` (n_walls, 2) are the rim vertices of all walls, ``was`` (n_walls,)
+    their lengths and ``onward`` (n_vertices,) how far the step moves each vertex along the rim.
+    """
 
     sites: WallSites
     scale: Floats
-    limit: Floats
+    kept: Ints
+    least: Floats
+    ends: Ints
+    was: Floats
+    onward: Floats
+
+    def apart(self, limit: Floats) -> Floats:
+        """Shares (n_vertices,) of the step, lessened so that every wall keeps half of its length.
+
+        Ends that passed each other would have the rest of the rim between them.
+        """
+        out = limit.copy()
+        tails, heads = self.ends.T
+        for rest in (*([0.5] * ROUNDS), 0.0):
+            shrink = self.onward[tails] * out[tails] - self.onward[heads] * out[heads]
+            close = shrink > 0.51 * self.was
+            if not close.any():
+                break
+            share = np.where(close, rest * self.was / np.maximum(shrink, 1e-300), 1.0)
+            np.minimum.at(out, tails, share * out[tails])
+            np.minimum.at(out, heads, share * out[heads])
+        return out
 
 
 def plan_walls(
@@ -54,6 +84,8 @@ def plan_walls(
     shares: Floats,
     busy: Ints,
     limits: WallLimits,
+    *,
+    t1: bool,
 ) -> WallSweep | None:
     """What a step to ``moved`` would make vanish at the rim, and which of it turns.
 
@@ -78,9 +110,6 @@ def plan_walls(
     small = shares[network.bubble[walls]]
     scale = np.minimum(1.0, np.sqrt(small))
     fails = (now < limits.short * scale) & (now < was)
-    share = np.where(was - now > 0.5 * was, 0.5 * was / np.maximum(was - now, 1e-300), 1.0)
-    limit = np.ones(network.n_vertices)
-
     degrees = network.vertex_degrees
     ends = np.stack([degrees[network.tails[failing]], degrees[network.heads[failing]]])
     to_rim = np.sort(ends, axis=0).T.tolist()
@@ -89,20 +118,40 @@ def plan_walls(
     sites = _joined(film_sites(network, halves), wall_sites(network, walls[fails]))
     fine = wall_allowed(network, sites) & ~np.isin(sites.bubbles, busy).any(axis=1)
     sites = _only(sites, fine)
+    kept = halves[:0]
     if len(sites.film):
         pull, _ = inward_pull(surface, network, state.points, state.offsets, sites)
         gain = np.where(sites.film >= 0, 1.0 - pull, pull - 1.0)
         earlier = np.maximum(turns[sites.before >> 1], turns[sites.after >> 1])
         wins = gain > limits.preference[0] + limits.preference[1] * earlier
+        wins &= t1
+        kept = sites.film[~wins & (sites.film >= 0)]
         sites, gain = _only(sites, wins), gain[wins]
         if len(gain):
             sites = _only(sites, independent(sites.bubbles, gain))
-    given_up = np.isin(walls, (sites.before ^ 1)[sites.film < 0])
-    share[given_up] = 1.0
-    np.minimum.at(limit, tails, share)
-    np.minimum.at(limit, heads, share)
     sizes = np.minimum(1.0, np.sqrt(shares[sites.bubbles].min(axis=1, initial=1.0)))
-    return WallSweep(sites, sizes, limit)
+    beside = np.minimum(shares[network.bubble[kept]], shares[network.bubble[kept ^ 1]])
+    least = 0.5 * limits.short * np.minimum(1.0, np.sqrt(beside))
+    ends = np.stack([tails, heads], axis=1)
+    return WallSweep(sites, sizes, kept, least, ends, was, place / length)
+
+
+def stood_up(cell: HeleShawCell, state: State, sweep: WallSweep, length: float) -> State:
+    """Films that are pulled away from the rim but have collapsed or crossed it stand up on it again."""
+    surface, network, halves = cell.surface, state.network, sweep.kept
+    rim = surface.rim
+    if rim is None or not len(halves):
+        return state
+    foot, inner = network.origin[halves ^ 1], network.origin[halves]
+    base = state.points[foot]
+    inward = rim.frame(*rim.locate(base))[1]
+    chord = state.points[inner] - base
+    span, least = np.linalg.norm(chord, axis=1), length * sweep.least
+    lost = (np.einsum("kx,kx->k", chord, inward) < 0.0) | (span < least)
+    points, offsets = state.points.copy(), state.offsets.copy()
+    points[inner[lost]] = surface.project(base + np.maximum(span, least)[:, None] * inward)[lost]
+    offsets[halves[lost] >> 1] = 0.0
+    return State(network, points, offsets, state.pressures)
 
 
 def turned_walls(

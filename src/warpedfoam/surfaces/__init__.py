@@ -1,5 +1,6 @@
 """Smooth surfaces and their triangulations; they know arcs, not foams."""
 
+from warpedfoam.surfaces.catenoid import Catenoid
 from warpedfoam.surfaces.cylinder import Cylinder
 from warpedfoam.surfaces.ellipsoid import Ellipsoid
 from warpedfoam.surfaces.files import read_mesh
@@ -13,12 +14,14 @@ from warpedfoam.surfaces.mesh_surface import MeshSurface
 from warpedfoam.surfaces.netted import NettedSurface
 from warpedfoam.surfaces.protocol import ArcTerms, Layer, Surface
 from warpedfoam.surfaces.revolution import Revolution
+from warpedfoam.surfaces.rim import Rim
 from warpedfoam.surfaces.schwarz_p import SchwarzP
 from warpedfoam.surfaces.sphere import Sphere
 from warpedfoam.surfaces.torus import Torus
 
 __all__ = [
     "ArcTerms",
+    "Catenoid",
     "Cylinder",
     "Ellipsoid",
     "FlatTorus",
@@ -31,6 +34,7 @@ __all__ = [
     "MeshSurface",
     "NettedSurface",
     "Revolution",
+    "Rim",
     "SchwarzP",
     "Sphere",
     "Surface",

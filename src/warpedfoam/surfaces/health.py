@@ -91,7 +91,7 @@ def mesh_report(mesh: TriangleMesh, *, gap: float | None = None, n_bubbles: int 
     >>> ball = Sphere(1.0).triangulate(500)
     >>> report = mesh_report(TriangleMesh(ball.nodes, ball.triangles[1:]))
     >>> report.sound, report.rims, report.findings[0].fault
-    (False, 1, 'open edges')
+    (True, 1, 'open edges')
     """
     _as_file_mesh(mesh)
     d = None if gap is None else as_number(gap, "gap", positive=True, maximum=SIZES["maximum"])
@@ -130,7 +130,8 @@ def mesh_report(mesh: TriangleMesh, *, gap: float | None = None, n_bubbles: int 
     add("triangles that occur twice", first[tally > 1], "triangle", f"keep one of each {MENDED}")
     add("edges with more than two triangles", edges.crowded, "edge at node", "remove the extra sheets")
     add("triangles turned against a neighbour", edges.flipped, "edge at node", f"turn them round {MENDED}")
-    add("open edges", edges.open_, "edge at node", f"close the holes {FILLED}: foams need a closed surface")
+    advice = f"films end on such a rim at 90 degrees; if it is damage, close it {FILLED}"
+    add("open edges", edges.open_, "edge at node", advice, fatal=False)
     pieces, piece = connected_components(edges.graph, directed=False)
     pieces -= int((~used).sum())
     if pieces > 1:
@@ -303,7 +304,7 @@ def _least_angles(mesh: TriangleMesh) -> Floats:
 
 def _pinched(mesh: TriangleMesh) -> list[MeshFinding]:
     try:
-        mesh.require_surface(closed=True)
+        mesh.require_surface()
     except MeshError as fault:
         return [MeshFinding("not a manifold", 1, "a node", str(fault), True)]
     return []
@@ -344,9 +345,9 @@ def _size_findings(
 
 
 def _closed_findings(mesh: TriangleMesh) -> list[MeshFinding]:
-    """What may be wrong with a proper closed mesh: inside out, or creased."""
+    """What may be wrong with a proper mesh: inside out if it is closed, or creased."""
     out = []
-    if _signed_volume(mesh) < 0.0:
+    if not len(mesh.rim_edges) and _signed_volume(mesh) < 0.0:
         advice = f"the gap lies inside; if it should lie outside, turn all triangles round {MENDED}"
         out.append(MeshFinding("inside out", 1, "everywhere", advice, False))
     a, b, c = (mesh.nodes[mesh.triangles[:, i]] for i in range(3))
@@ -355,7 +356,11 @@ def _closed_findings(mesh: TriangleMesh) -> list[MeshFinding]:
     n = mesh.n_nodes
     start, end = mesh.triangles.ravel(), np.roll(mesh.triangles, -1, axis=1).ravel()
     order = np.argsort(start * n + end)
-    twin = order[np.searchsorted((start * n + end)[order], end * n + start)]
+    place = np.searchsorted((start * n + end)[order], end * n + start)
+    twin = order[np.minimum(place, len(order) - 1)]
+    # edges of the rim have no twin, and no crease
+    paired = (end[twin] == start) & (start[twin] == end)
+    twin = np.where(paired, twin, np.arange(len(twin)))
     owner = np.repeat(np.arange(mesh.n_triangles), 3)
     cosine = np.einsum("nx,nx->n", normal[owner], normal[owner[twin]])
     sharp = np.flatnonzero((cosine < np.cos(np.radians(CREASE))) & (start < end))

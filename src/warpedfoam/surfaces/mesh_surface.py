@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -12,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.spatial import cKDTree
 
-from warpedfoam.arrays import Floats, Ints, as_integer, frozen
+from warpedfoam.arrays import Bools, Floats, Ints, as_integer, frozen
 from warpedfoam.errors import MeshError
 from warpedfoam.kernels.jets import Jets, blended, fit_jets
 from warpedfoam.surfaces.files import read_mesh
@@ -30,17 +32,20 @@ SAME_SHEET = 0.2
 #: Farthest from the origin, in extents of the mesh: beyond it round-off shows in the forces. Largest
 #: error of the total curvature, in units of 2π: with more the patches do not make up one surface.
 FARTHEST, TOTAL_CURVATURE = 1e3, 0.1
+#: Cosine of the angle by which a rim's edges turn in a corner.
+CORNER = np.cos(np.radians(45.0))
 SMOOTHER = "the mesh is too rough, too coarse or crosses itself there: smooth, refine or remesh it"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeshSurface(LevelSurface):
-    """Smooth surface through a closed triangle mesh, the gap on the side to which its triangles face.
+    """Smooth surface through a triangle mesh, the gap on the side to which its triangles face.
 
     At each node a quartic jet is fitted to the nodes of three rings, and the jets are blended into one
     implicit function (`warpedfoam.kernels.jets`), four times differentiable, so that Newton's method
     converges as on formulas. The nodes are samples of the surface, not fixed points of it: noise of
-    size ε shows as 0.5 ε.
+    size ε shows as 0.5 ε. Where the mesh ends, so does the surface: its rim is a spline through the
+    nodes there, with corners where they turn by more than 45°.
 
     Parameters
     ----------
@@ -50,8 +55,8 @@ class MeshSurface(LevelSurface):
     Raises
     ------
     TypeError, ValueError, MeshError
-        If the arrays are no closed, connected, consistently oriented manifold of proper triangles, or
-        too rough or coarse to pass a smooth surface through.
+        If the arrays are no connected, consistently oriented manifold of proper triangles, or too rough
+        or coarse to pass a smooth surface through.
 
     Notes
     -----
@@ -102,7 +107,11 @@ class MeshSurface(LevelSurface):
         with np.errstate(all="ignore"):
             try:
                 rule = self._patches.quadrature()
-                total = self._moments[2] / (2.0 * np.pi)
+                total = self._moments[2]
+                if self.rim is not None:
+                    start = np.zeros(self.rim.n_loops)
+                    total += self.rim.turning(np.arange(len(start)), start, self.rim.lengths).sum()
+                total /= 2.0 * np.pi
             except np.linalg.LinAlgError:
                 raise MeshError(f"no smooth surface passes through the mesh; {SMOOTHER}") from None
         torn = ~(np.isfinite(rule.points).all(axis=1) & np.isfinite(rule.weights))
@@ -139,6 +148,21 @@ class MeshSurface(LevelSurface):
         """
         mesh = read_mesh(path)
         return cls(mesh.nodes, mesh.triangles)
+
+    def rim_loops(self) -> Sequence[Sequence[Floats]]:
+        """The mesh's rim on the smooth surface, cut into sides at its corners."""
+        nodes = self._refined(0).nodes
+        return [_sides(nodes[loop], self._unit(nodes[loop])) for loop in self.source.rim_loops]
+
+    def beyond(self, points: Floats) -> Bools:
+        """Next to a node of the rim, and on the far side of the rim."""
+        far = np.zeros(len(points), dtype=np.bool_)
+        if self.rim is not None:
+            at_rim = np.zeros(self.source.n_nodes, dtype=np.bool_)
+            at_rim[self.source.rim_edges] = True
+            near = np.flatnonzero(at_rim[self._jets[2].query(points)[1]])
+            far[near] = self.rim.beyond(points[near])
+        return far
 
     @property
     def size(self) -> float:
@@ -183,6 +207,11 @@ class MeshSurface(LevelSurface):
             else:
                 coarse = self._refined(halvings - 1)
                 points, triangles = _halved(coarse)
+                if self.rim is not None:
+                    # the rim between two of its nodes is curved
+                    edge, ends = _rim_places(coarse), coarse.nodes[coarse.rim_edges]
+                    loop, first, last = self.rim.spans(ends[:, 0], ends[:, 1])
+                    points[coarse.n_nodes + edge] = self.rim.at(loop, 0.5 * (first + last))
                 new = start = points[coarse.n_nodes :]
                 nodes = np.concatenate([coarse.nodes, self.foot(new, self._unit(new))])
             lost = np.flatnonzero(~np.isfinite(nodes[-len(start) :]).all(axis=1))
@@ -288,3 +317,25 @@ def _halved(mesh: TriangleMesh) -> tuple[Floats, Ints]:
     quarters = [(x, p, r), (p, y, q), (r, q, z), (p, q, r)]
     triangles = np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
     return np.concatenate([mesh.nodes, 0.5 * (mesh.nodes[a] + mesh.nodes[b])]), triangles
+
+
+def _sides(points: Floats, normals: Floats) -> list[Floats]:
+    """A loop of points (n, 3) cut where its edges turn sharply in the surface."""
+    edge = np.roll(points, -1, axis=0) - points
+    edge -= np.einsum("nx,nx->n", edge, normals)[:, None] * normals
+    edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+    cosine = np.einsum("nx,nx->n", edge, np.roll(edge, 1, axis=0))
+    corners = np.flatnonzero(cosine < CORNER)
+    if not corners.size:
+        return [points]
+    turned = np.roll(points, -corners[0], axis=0)
+    turned = np.concatenate([turned, turned[:1]])
+    cuts = np.append(corners - corners[0], len(points))
+    return [turned[a : b + 1] for a, b in pairwise(cuts)]
+
+
+def _rim_places(mesh: TriangleMesh) -> Ints:
+    """Place of each of the rim's edges in ``mesh.edges``."""
+    keys = mesh.edges[:, 0] * mesh.n_nodes + mesh.edges[:, 1]
+    out: Ints = np.searchsorted(keys, mesh.rim_edges.min(axis=1) * mesh.n_nodes + mesh.rim_edges.max(axis=1))
+    return out

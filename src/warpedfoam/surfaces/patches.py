@@ -9,6 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from warpedfoam.arrays import Bools, Floats, Ints
+from warpedfoam.errors import MeshError
 from warpedfoam.kernels.height_arcs import dots
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import gauss, lobatto
@@ -115,6 +116,14 @@ class PatchedMesh:
         rule, (xi, omega), (r, share) = lobatto(6), gauss(5), gauss(2)
         ends = self._mesh.nodes
         loop, first, last = rim.spans(ends[a], ends[b])
+        length = np.linalg.norm(ends[b] - ends[a], axis=1)
+        astray = last - first > 3.0 * length
+        if astray.any():
+            x, y, z = ends[a[np.argmax(astray)]]
+            raise MeshError(
+                f"the rim is too rough at ({x:.4g}, {y:.4g}, {z:.4g}) to pass a curve through: smooth it, or "
+                "use more nodes"
+            )
         outer = rim.nodes(rule, loop, first, last)
         part = rule.nodes[:, None, None]
         flat, axes = ((1.0 - part) * x[a] + part * x[b] for x in (ends, self._normals))

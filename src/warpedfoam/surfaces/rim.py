@@ -273,7 +273,10 @@ def _fitted(loop: int, points: Floats, start: float, *, closed: bool) -> _Side:
         curve = make_interp_spline(u, points, k=degree, bc_type="periodic")
     else:
         curve = make_interp_spline(u, points, k=min(degree, len(points) - 1))
-    return _Side(loop, float(u[0]), float(u[-1]), closed, curve, curve.derivative(1), curve.derivative(2))
+    slope = curve.derivative(1)
+    # two points make a straight side
+    bend = slope.derivative(1) if curve.k > 1 else BSpline(slope.t, 0.0 * slope.c, slope.k)
+    return _Side(loop, float(u[0]), float(u[-1]), closed, curve, slope, bend)
 
 
 def with_walls(

@@ -212,9 +212,10 @@ def _require_disks(mesh: TriangleMesh, labels: Ints, count: int) -> None:
     euler = _euler(mesh, labels, count)
     if _islands(mesh, labels, count).any() or (euler != 1).any():
         bad = int((euler != 1).sum())
+        hole = ", nor round a hole: close those that are damage" if mesh.rim_loops else ""
         raise ResolutionError(
             f"{bad} of {count} bubbles would not be disks: too few bubbles for the surface (a bubble "
-            "must not reach round it), or too few mesh nodes"
+            f"must not reach round it{hole}), or too few mesh nodes"
         )
 
 
