@@ -126,7 +126,16 @@ FAMILY = {
 }
 
 #: Bubbles that resolve the narrow ones.
-COUNTS = {"vase": 200, "ring": 240, "mesh": 160, "crystal": 200, "tube": 240, "hills": 240, "patch": 60, "plate": 60}
+COUNTS = {
+    "vase": 200,
+    "ring": 240,
+    "mesh": 160,
+    "crystal": 200,
+    "tube": 240,
+    "hills": 240,
+    "patch": 60,
+    "plate": 60,
+}
 
 each_member = pytest.mark.parametrize("member", FAMILY.values(), ids=FAMILY)
 formulas = pytest.mark.parametrize(

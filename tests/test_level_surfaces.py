@@ -37,7 +37,6 @@ from .level_samples import (
 )
 
 
-
 def along_rims(foam, steps):
     """Vertex steps without what leads rim vertices off the rim."""
     held = held_vertices(foam.cell.surface, foam.network, foam.vertex_points, foam.film_offsets)

@@ -134,7 +134,7 @@ def _rewired(network: CellNetwork, sites: T1Sites) -> CellNetwork:
 
 
 def independent(bubbles: Ints, priority: Floats) -> Bools:
-    """A set of sites with no bubble in common: each has the greatest priority round its ``bubbles`` (k, m)."""
+    """A set of sites with no bubble in common: each has the greatest priority of its ``bubbles`` (k, m)."""
     rank = np.empty(len(priority), dtype=np.int64)
     rank[np.argsort(priority, kind="stable")] = np.arange(len(priority))
     best = np.full(int(bubbles.max(initial=-1)) + 1, -1, dtype=np.int64)

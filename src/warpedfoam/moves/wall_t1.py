@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_choice, as_indices, as_number
 from warpedfoam.errors import TopologyError
@@ -77,8 +76,9 @@ def rewire_walls(network: CellNetwork, sites: WallSites) -> tuple[CellNetwork, I
     fine = wall_allowed(network, sites)
     if not fine.all():
         raise TopologyError(
-            f"site {int(np.flatnonzero(~fine)[0])} at the wall cannot turn: its three bubbles must be different "
-            "disks, those that lose a film or a wall must have at least four sides, and there must be no marker"
+            f"site {int(np.flatnonzero(~fine)[0])} at the wall cannot turn: its three bubbles must be "
+            "different disks, those that lose a film or a wall must have at least four sides, and there must "
+            "be no marker"
         )
     if len(np.unique(sites.bubbles)) != sites.bubbles.size:
         raise TopologyError("two of the T1s at walls share a bubble; make them one after the other")

@@ -20,8 +20,8 @@ from warpedfoam.moves.t1 import (
     t1_sites,
 )
 from warpedfoam.relax.held import moved_points
-from warpedfoam.relax.wall_sweep import WallLimits, WallSweep, plan_walls
 from warpedfoam.relax.system import State, Step
+from warpedfoam.relax.wall_sweep import WallLimits, WallSweep, plan_walls
 
 #: A film turns if it would become shorter than this, in bubble sizes (0.1 makes T1s cycle).
 SHORT = 0.02
@@ -63,8 +63,9 @@ def plan_sweep(
     """Find films that the step would make vanish, and decide which of them turn.
 
     A film fails if its chord would shrink below ``SHORT`` bubble sizes (less beside small bubbles, whose
-    ``shares`` of the mean volume are below 1) or reverse. It turns if the pull of its neighbours on the turned film is greater than on it, ``turns`` counting its earlier
-    T1s. All other films keep half of their chord.
+    ``shares`` of the mean volume are below 1) or reverse. It turns if the pull of its neighbours on the
+    turned film is greater than on it, ``turns`` counting its earlier T1s. All other films keep half of
+    their chord.
     """
     network = state.network
     scale = np.minimum(1.0, np.sqrt(np.minimum(shares[network.left], shares[network.right])))
@@ -175,5 +176,3 @@ def _energies(cell: HeleShawCell, state: State, films: Ints) -> Floats:
     areas = cell.surface.arc_measure(tail, head, state.offsets[flat], cell.layer)
     out: Floats = areas.reshape(films.shape).sum(axis=1)
     return out
-
-

@@ -21,7 +21,6 @@ from warpedfoam.moves.wall_t1 import (
 )
 from warpedfoam.relax.system import State
 
-
 #: Rounds in which steps are lessened where walls shrink too fast.
 ROUNDS = 8
 
@@ -99,7 +98,7 @@ def plan_walls(
         return None
     walls = network.walls
     tails, heads = network.origin[walls ^ 1], network.origin[network.next[walls]]
-    loop, first, last = rim.spans(state.points[tails], state.points[heads])
+    _, first, last = rim.spans(state.points[tails], state.points[heads])
     on = network.rim_vertices
     place = np.zeros(network.n_vertices)
     (where, before), after = rim.locate(state.points[on]), rim.locate(moved[on])[1]
@@ -180,9 +179,7 @@ def turned_walls(
     place[source[source >= 0]] = np.flatnonzero(source >= 0)
     film = np.full(len(lost), -1)
     film[~lost] = np.flatnonzero(source < 0)
-    settled = WallSites(
-        film, 2 * place[sites.before >> 1], 2 * place[sites.after >> 1], sites.bubbles
-    )
+    settled = WallSites(film, 2 * place[sites.before >> 1], 2 * place[sites.after >> 1], sites.bubbles)
     later = _energies(cell, out, settled, film)
     where = points[network.origin[sites.before]]
     events = []

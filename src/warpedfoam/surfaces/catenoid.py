@@ -47,7 +47,8 @@ class Catenoid(LevelSurface):
             object.__setattr__(self, name, as_number(getattr(self, name), name, positive=True, **SIZES))
         if self.height > MOST * self.neck_radius:
             raise ValueError(
-                f"height must be at most {MOST:g} neck radii, {MOST * self.neck_radius:g}, got {self.height:g}"
+                f"height must be at most {MOST:g} neck radii, {MOST * self.neck_radius:g}, "
+                f"got {self.height:g}"
             )
 
     def _radius(self, z: Floats) -> Floats:

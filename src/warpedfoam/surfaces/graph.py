@@ -170,7 +170,8 @@ class Graph(LevelSurface):
         if self.disk:
             out: Bools = np.hypot(points[:, 0], points[:, 1]) > 0.5 * self.width
             return out
-        return (np.abs(points[:, :2]) > [0.5 * self.width, 0.5 * self.height]).any(axis=1)
+        over: Bools = np.abs(points[:, :2]) > [0.5 * self.width, 0.5 * self.height]
+        return over[:, 0] | over[:, 1]
 
     def rim_loops(self) -> Sequence[Sequence[Floats]]:
         """The domain's edge, lifted: a circle, or four sides."""

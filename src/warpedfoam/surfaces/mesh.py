@@ -128,7 +128,7 @@ class TriangleMesh:
 
     @cached_property
     def rim_loops(self) -> tuple[Ints, ...]:
-        """Nodes along each loop of the rim, the surface on the left; of a mesh that passes `require_surface`."""
+        """Nodes along each loop of the rim, the surface on the left, once `require_surface` has passed."""
         start, end = self.rim_edges.T
         if not len(start):
             return ()

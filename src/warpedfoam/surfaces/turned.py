@@ -20,9 +20,7 @@ Profile = Callable[[Floats], Floats]
 def circle(radius: float, height: float, *, turned: bool) -> Floats:
     """Points round a circle, (n, 3): counter-clockwise seen from above, clockwise if ``turned``."""
     angle = 2.0 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS * (-1.0 if turned else 1.0)
-    return np.stack(
-        [radius * np.cos(angle), radius * np.sin(angle), np.full(RIM_POINTS, height)], axis=1
-    )
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(RIM_POINTS, height)], axis=1)
 
 
 def turned_rims(profile: Profile, bottom: float, top: float, poles: tuple[bool, bool]) -> list[list[Floats]]:
@@ -66,9 +64,7 @@ def turned_mesh(
     radii = profile(heights)
     counts = np.maximum(np.round(2.0 * np.pi * radii / edge), 5).astype(np.int64)
     ring, angle, triangles = stitched_rings(counts, closed=False)
-    nodes = np.stack(
-        [radii[ring] * np.cos(angle), radii[ring] * np.sin(angle), heights[ring]], axis=1
-    )
+    nodes = np.stack([radii[ring] * np.cos(angle), radii[ring] * np.sin(angle), heights[ring]], axis=1)
     first = np.cumsum(counts) - counts
     for pole, height, which, up in ((poles[0], bottom, 0, False), (poles[1], top, -1, True)):
         if pole:
