@@ -411,7 +411,8 @@ def test_check_takes_a_rim_as_meant_and_says_what_it_means(tmp_path):
     assert result.exit_code == 0
     assert "note      open edges (3; first: edge at node" in result.output
     assert "films end on such a rim at 90 degrees; if it is damage, close it" in result.output
-    assert "genus 0" in result.output and "1 rim" in result.output
+    assert "genus 0" in result.output
+    assert "1 rim" in result.output
 
 
 def test_check_repairs_into_a_new_file(tmp_path):
