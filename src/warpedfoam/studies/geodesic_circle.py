@@ -133,9 +133,8 @@ def geodesic_circle(
     and that the circle, interpolated to 1024 points, does not cross itself. A circle whose radius exceeds
     the injectivity radius by less than about 5e-6 of itself may pass. C, A and ``error`` of "jacobi" come
     from an adaptive Runge–Kutta method of order 8 (DOP853) on all directions at once, run at
-            f"surface must be a surface such as Sphere(1.0) or Torus(20.0, 4.0), "
-            f"got {type(surface).__name__}"
-    of directions changed.
+    the tolerance and at 100 times that; the error is the difference between the runs plus what the last
+    doubling of directions changed.
 
     Examples
     --------
