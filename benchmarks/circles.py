@@ -77,9 +77,7 @@ def main() -> int:
     options = parser.parse_args()
     rows: list[dict[str, object]] = []
     met = True
-    print(
-        "| ρ | method | h/ρ | C: error / curvature term | A: error / curvature term | C: relative | estimate | s |"
-    )
+    print("| ρ | method | h/ρ | C: error / term | A: error / term | C: relative | estimate | s |")
     print("|---|---|---|---|---|---|---|---|")
     wf.geodesic_circle(wf.Sphere(1.0), [0.0, 0.0, 1.0], 0.5, method="exact")  # imports
     for rho in RADII:

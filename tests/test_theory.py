@@ -166,6 +166,13 @@ def test_second_order_against_3d_films():
     np.testing.assert_allclose((1 / k + t) * np.sin(away * k), [0.55166956, 0.57632222], atol=2e-5)
 
 
+def test_error_on_spheres_falls_at_least_as_the_third_power():
+    """Full 3D films, V = d = 0.5, at r = 10 and r = 12."""
+    films = np.array([0.999513760, 1.77185042614 / float(th.flat_energy(0.5, 0.5))])
+    fault = np.abs(th.second_order_ratio(0.5, 0.5, [0.1, 1 / 12], [0.1, 1 / 12]) - films)
+    assert np.log(fault[0] / fault[1]) / np.log(1.2) > 3.0
+
+
 def test_cone_is_the_ruled_film_on_a_sphere_and_the_error_is_of_fourth_order():
     """From midway a sphere has only even powers of its curvature, so the error falls faster than k³."""
     for v in (0.3, 0.7):
