@@ -151,6 +151,29 @@ def test_isolines_on_the_sphere(method):
     assert found.area == pytest.approx(theory.cap_area(2.0, 2.0), rel=limit)
 
 
+def test_one_isoline_in_the_plane_and_on_a_cylinder_is_right_without_extrapolation():
+    """Where distances on facets are exact (or nearly), chords become arcs by both of their curvatures."""
+    from warpedfoam.studies.measured_circle import _exact, _isoline
+    from warpedfoam.studies.mesh_disk import mesh_disk
+
+    flat, q = wf.FlatTorus(12.0, 12.0), np.array([0.13, 0.21, 0.0])
+    faults = []
+    for spacing in (0.4, 0.2):
+        disk = mesh_disk(flat, q, 1.02, spacing)
+        line = _isoline(flat, disk, _exact(disk, q, 1.0), 1.0, 0.0)
+        faults.append(abs(line.perimeter / (2 * np.pi) - 1))
+        assert line.area == pytest.approx(np.pi, rel=3e-4 if spacing == 0.4 else 3e-5)
+    assert faults[0] < 3e-4
+    assert faults[1] < 1e-5
+    # the isoline of true distances on a tube: its chords are short by the tube's curvature too
+    tube = wf.Cylinder(0.8, 20.0, periodic=True)
+    centre = np.array([0.8, 0.0, 0.0])
+    disk = mesh_disk(tube, centre, 1.02, 0.1)
+    along = 0.8 * np.arctan2(disk.nodes[:, 1], disk.nodes[:, 0])
+    line = _isoline(tube, disk, np.hypot(along, disk.nodes[:, 2]), 1.0, 0.0)
+    assert line.perimeter == pytest.approx(2 * np.pi, rel=1e-5)
+
+
 def test_points_lie_in_order_at_the_distance():
     for method in ("jacobi", "exact"):
         found = wf.geodesic_circle(wf.Sphere(1.0), [0.0, 0.0, 1.0], 0.8, method=method)

@@ -60,6 +60,16 @@ def test_the_lines_are_the_tables():
     cylinder, free = drawn_lines(drawn.figure.axes[0])
     np.testing.assert_array_equal(cylinder[:, 1], drawn.table["cylinder"])
     np.testing.assert_array_equal(free[:, 1], drawn.table["second_order"])
+    t, phi = drawn.table, np.radians(drawn.table["phi_degrees"])
+    energy = theory.cylinder_energy(0.5, 0.5, theory.torus_gaussian_curvature(phi, 20.0, 4.0))
+    np.testing.assert_allclose(t["cylinder"], energy / theory.flat_energy(0.5, 0.5), rtol=1e-13)
+    t = figure_gap(tilts=(3e-4,)).table
+    phi = np.radians(t["phi_degrees"])
+    g = theory.torus_gaussian_curvature(phi, 20.0, 4.0)
+    there = theory.cylinder_energy(0.5, 0.5, g) + theory.gap_energy_change(0.5, 0.5, 3e-4 * np.cos(phi))
+    np.testing.assert_allclose(t["ratio"], there / theory.flat_energy(0.5, 0.5), atol=1e-7)
+    t = figure_curvature().table
+    np.testing.assert_allclose(t["relative_gap"], 0.5 * np.sqrt(np.abs(t["gaussian_curvature"])), rtol=1e-14)
 
 
 def test_points_of_films_are_drawn_and_fitted():

@@ -140,6 +140,10 @@ def _disk(nodes: Floats, triangles: Ints, start: int) -> MeshDisk:
         if not pinched.size:
             break
         triangles = triangles[~touching]
+    if not (used[tri] == start).any():
+        raise ResolutionError(
+            "the mesh is too coarse round the centre to cut a disk from it; take a finer one"
+        )
     links = coo_array(
         (np.ones(3 * len(tri)), (np.repeat(np.arange(len(tri)), 3), sides.ravel())),
         shape=(len(tri), len(edges)),
