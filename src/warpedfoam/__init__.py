@@ -13,6 +13,7 @@ A foam one bubble thick sits between two parallel curved plates a small gap apar
 from warpedfoam import startup  # first, before anything slow
 
 # isort: split
+from warpedfoam import theory
 from warpedfoam.analysis import (
     EquilibriumReport,
     SideDistribution,
@@ -41,6 +42,7 @@ from warpedfoam.moves import T1Event, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import plot_foam, save_picture
 from warpedfoam.relax import Relaxation, relax
+from warpedfoam.studies import GeodesicCircle, geodesic_circle
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
@@ -79,6 +81,7 @@ __all__ = [
     "FileFormatError",
     "FlatTorus",
     "Foam",
+    "GeodesicCircle",
     "GeodesicDistances",
     "Graph",
     "HeatGeodesics",
@@ -100,6 +103,7 @@ __all__ = [
     "TriangleMesh",
     "WarpedFoamError",
     "equilibrium_report",
+    "geodesic_circle",
     "geodesic_distances",
     "geodesic_report",
     "load",
@@ -112,6 +116,7 @@ __all__ = [
     "save_picture",
     "side_distribution",
     "t1",
+    "theory",
     "voronoi_foam",
     "wall_t1",
     "write_bubbles_csv",
