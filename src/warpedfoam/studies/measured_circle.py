@@ -65,7 +65,7 @@ def heat_circle(
     disk = mesh_disk(surface, centre, 1.5 * radius + 4.0 * spacing, spacing)
     edge = _resolved(disk, radius)
     mesh = disk.doubled()
-    mesh.require_closed_surface()
+    mesh.require_surface()
     time = TIME_FACTOR * mesh.mean_edge**2
     report = geodesic_report(mesh, centre[None], time, method="heat")
     mirror = disk.mirror

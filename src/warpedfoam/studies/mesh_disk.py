@@ -106,7 +106,7 @@ def _start(surface: Surface, spacing: float) -> TriangleMesh:
     if count < 10_000:
         with suppress(MeshError):
             mesh = surface.triangulate(max(count, LEAST_NODES))
-            mesh.require_closed_surface()
+            mesh.require_surface()
             if mesh.euler_characteristic == surface.euler_characteristic:
                 return mesh
     return surface.mesh
