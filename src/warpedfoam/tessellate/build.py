@@ -24,8 +24,8 @@ from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import Layer
-from warpedfoam.tessellate.fields import SeedFields, seed_fields
-from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR, HeatGeodesics
+from warpedfoam.tessellate.fields import SeedFields, heat_solver, seed_fields
+from warpedfoam.tessellate.geodesics import COLOUR_TIME_FACTOR
 from warpedfoam.tessellate.power import power_weights
 from warpedfoam.tessellate.regions import (
     RegionNetwork,
@@ -168,7 +168,7 @@ def _built(
 ) -> Foam:
     surface, count = cell.surface, len(points)
     mesh = surface.triangulate(n_nodes)
-    heat = HeatGeodesics(mesh, t=COLOUR_TIME_FACTOR * mesh.mean_edge**2)
+    heat = heat_solver(mesh, COLOUR_TIME_FACTOR * mesh.mean_edge**2)
     spacing = float(np.sqrt(surface.area / count))
     rounds = sweeps + 1
 

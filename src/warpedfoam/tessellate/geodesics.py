@@ -399,7 +399,7 @@ def _factor(mesh: TriangleMesh, t: float) -> Any:
     or a regular tetrahedron's is exactly 0, so a second try moves the nodes by 1e-12 edges.
     """
     if mesh.period is not None:
-        return IntrinsicHeat(mesh, t)
+        return IntrinsicHeat(mesh.corners, mesh.triangles, mesh.n_nodes, t)
     import igl
 
     nudge = 1e-12 * mesh.mean_edge * np.random.default_rng(0).uniform(-1.0, 1.0, mesh.nodes.shape)
