@@ -86,7 +86,7 @@ def test_points_a_hair_below_the_unit_are_inside():
 def test_own_heat_method_is_that_of_libigl():
     mesh = Sphere(1.0).triangulate(4000)
     t = 4.0 * mesh.mean_edge**2
-    own = IntrinsicHeat(mesh, t)
+    own = IntrinsicHeat(mesh.corners, mesh.triangles, mesh.n_nodes, t)
     for sources in ([7], [7, 2000, 3100]):
         found = own.solve(np.array(sources))
         np.testing.assert_allclose(
