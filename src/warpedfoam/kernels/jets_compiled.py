@@ -1,4 +1,4 @@
-"""The loops of `warpedfoam.kernels.jets` for numba, which makes them 5 to 10 times faster; numpy's are the model.
+"""The loops of `warpedfoam.kernels.jets` for numba, 5 to 10 times faster; numpy's are the model.
 
 Plain functions here, compiled by `compiled` when a large mesh first needs them, so that importing this file
 needs no numba and costs nothing. They call no helpers: numba keeps what it compiled from one run to the next.
@@ -25,7 +25,8 @@ def compiled() -> tuple[Callable[..., Any], Callable[..., Any]] | None:
         import numba
     except ImportError:
         return None
-    if numba.config.DISABLE_JIT:
+    config: Any = numba.config
+    if config.DISABLE_JIT:
         return None
     try:
         make = numba.njit(cache=True, error_model="numpy")

@@ -29,7 +29,7 @@ LINE_STEPS, NEAREST_STEPS = 12, 200
 #: Rounds of the even lattice.
 LATTICE_ROUNDS = 40
 
-#: f, its gradient and, if asked for, second derivatives, at new places of those points of `LevelSurface.near`.
+#: f, its gradient and, if asked for, second derivatives, at new places of some points of `LevelSurface.near`.
 Look = Callable[[Floats, "Ints | slice", bool], tuple[Floats, Floats, Floats | None]]
 
 
@@ -50,11 +50,11 @@ class LevelSurface(ABC):
     def level(self, points: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
         """f (n,), its gradient (n, 3), and its second derivatives (n, 3, 3) if asked for."""
 
-    def near(self, points: Floats) -> Look:
+    def near(self, points: Floats) -> Look:  # noqa: ARG002
         """`level` for points that will move a little: whatever can be found once is found here."""
-        return lambda places, which, second: self.level(places, second=second)
+        return lambda places, _, second: self.level(places, second=second)
 
-    def least_rays(self, n_loops: int) -> int:
+    def least_rays(self, n_loops: int) -> int:  # noqa: ARG002
         """Fewest points on a ray from the centre of one of ``n_loops`` loops that resolve the surface."""
         return 0
 

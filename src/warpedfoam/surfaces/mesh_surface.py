@@ -181,9 +181,7 @@ class MeshSurface(LevelSurface):
         start = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
         nearest = np.asarray(tree.query(start)[1], dtype=np.int64)
 
-        def look(
-            places: Floats, which: Ints | slice, second: bool
-        ) -> tuple[Floats, Floats, Floats | None]:
+        def look(places: Floats, which: Ints | slice, second: bool) -> tuple[Floats, Floats, Floats | None]:
             node = nearest[which]
             away = places - start[which]
             far = np.flatnonzero(~(dots(away, away) <= (0.5 * jets.spacing[node]) ** 2))

@@ -19,7 +19,7 @@ from warpedfoam.errors import ConvergenceError, MeshError
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.places import Places
-from warpedfoam.tessellate.exact_geodesics import exact_distances, polyhedral_error
+from warpedfoam.tessellate.exact_geodesics import exact_distances, locate, polyhedral_error
 from warpedfoam.tessellate.intrinsic_heat import IntrinsicHeat
 
 if TYPE_CHECKING:
@@ -332,7 +332,9 @@ def _heat_distances(
             np.minimum(best, heat.distances(node), out=best)
         return best
     points = as_points(array, "sources")
-    corners, shares = _affine(heat.mesh, points)
+    _nearest_nodes(heat.mesh, points)
+    triangles, shares = locate(heat.mesh, points)
+    corners = heat.mesh.triangles[triangles]
     lifts = (nearest_image(heat.mesh.nodes[corners] - points[:, None], heat.mesh.period) ** 2).sum(axis=2)
     for nodes, share, lift in zip(corners, shares, lifts, strict=True):
         squares = np.stack([heat.distances(node) for node in nodes]) ** 2
@@ -447,24 +449,3 @@ def _nearest_nodes(mesh: TriangleMesh, points: Floats) -> Ints:
             "node; project them first"
         )
     return node
-
-
-def _affine(mesh: TriangleMesh, points: Floats) -> tuple[Ints, Floats]:
-    """Corners (k, 3) of a triangle at each point's nearest node, and the affine coordinates (k, 3)."""
-    node = _nearest_nodes(mesh, points)
-    corner = np.argsort(mesh.triangles.ravel(), kind="stable")
-    first = np.searchsorted(mesh.triangles.ravel()[corner], np.arange(mesh.n_nodes + 1))
-    count = first[node + 1] - first[node]
-    which = np.repeat(np.arange(len(points)), count)
-    place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-    triangle = corner[first[node][which] + place] // 3
-    a, b, c = mesh.corners[triangle].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    scale = (normal**2).sum(axis=1)
-    x = nearest_image(points[which] - a, mesh.period)
-    beta = (np.cross(x, c - a) * normal).sum(axis=1) / scale
-    gamma = (np.cross(b - a, x) * normal).sum(axis=1) / scale
-    shares = np.stack([1.0 - beta - gamma, beta, gamma], axis=1)
-    order = np.lexsort((shares.min(axis=1), which))
-    best = order[np.cumsum(count) - 1]
-    return mesh.triangles[triangle[best]], shares[best]
