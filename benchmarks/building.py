@@ -4,11 +4,11 @@
     python benchmarks/building.py --bubbles 1200 2500 5000 10000 --mesh
 
 Random seeds on the torus R = 20, r = 4, 50 mesh nodes a bubble. Seconds are the processor's, of one thread;
-the clock's are printed beside them. What else runs on the machine still counts, through its memory and caches.
+the clock's are printed beside them. What else runs on the machine still counts, through memory and caches.
 With ``--mesh`` the surface is reconstructed from the jittered nodes of that mesh; reconstruction is timed
-apart, and numba, if it is installed, has compiled its loops before. Prints the exponents of the growth. Ends with an error if the
-largest took longer than ``--limit`` seconds, reconstruction included, or a total grows faster than
-``--growth``.
+apart, and numba, if it is installed, has compiled its loops before. Prints the exponents of the growth.
+Ends with an error if the largest took longer than ``--limit`` seconds, reconstruction included, or a total
+grows faster than ``--growth``.
 """
 
 from __future__ import annotations

@@ -61,7 +61,8 @@ def voronoi_foam(
 ) -> Foam:
     """Foam of the geodesic Voronoi cells of seeds on the cell's inner plate.
 
-    Distances come from libigl's heat method, one solve for each colour of seeds; mesh nodes go to
+    Distances come from the heat method, one solve for each colour of seeds, on the whole mesh by libigl
+    or, from 40 000 nodes on, domain by domain (see `warpedfoam.tessellate.domains`); mesh nodes go to
     their nearest seed, films to where d² is equal, interpolated linearly along mesh edges. The
     cells' volumes are what they are; `warpedfoam.relax` brings them to the volumes asked for.
 
