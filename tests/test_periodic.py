@@ -29,7 +29,7 @@ from warpedfoam.kernels.nets import surface_net
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces import TriangleMesh
 from warpedfoam.surfaces.places import Places
-from warpedfoam.tessellate import HeatGeodesics
+from warpedfoam.tessellate import HeatGeodesics, intrinsic_heat
 from warpedfoam.tessellate.intrinsic_heat import IntrinsicHeat
 
 from .level_samples import hill_height, hill_slope, relaxed_on
@@ -83,15 +83,39 @@ def test_points_a_hair_below_the_unit_are_inside():
 # ---------------------------------------------------------------------------- geodesics
 
 
-def test_own_heat_method_is_that_of_libigl():
+def test_own_heat_method_is_that_of_libigl_but_at_seams(monkeypatch):
+    monkeypatch.setattr(intrinsic_heat, "SEAM", 0.0)
     mesh = Sphere(1.0).triangulate(4000)
     t = 4.0 * mesh.mean_edge**2
-    own = IntrinsicHeat(mesh, t)
+    own = IntrinsicHeat(mesh.corners, mesh.triangles, mesh.n_nodes, t)
     for sources in ([7], [7, 2000, 3100]):
         found = own.solve(np.array(sources))
         np.testing.assert_allclose(
             found, HeatGeodesics(mesh, t).distances(sources), atol=0.03 * mesh.mean_edge
         )
+
+
+@pytest.mark.parametrize("factor", [1.0, 4.0])
+def test_distances_are_not_long_behind_seams(factor, monkeypatch):
+    """Full-length X makes them up to 1 h and 2 h too long, more on finer meshes: see `IntrinsicHeat`."""
+    sheet = FlatTorus(10.0, 8.0)
+    mesh = sheet.triangulate(12_000)
+    h, t = mesh.mean_edge, factor * mesh.mean_edge**2
+    exact = np.linalg.norm(nearest_image(mesh.nodes - mesh.nodes[5], sheet.period), axis=1)
+    far = exact > 4.0 * h
+
+    def error():
+        return (HeatGeodesics(mesh, t).distances(5) - exact)[far] / h
+
+    mended = error()
+    monkeypatch.setattr(intrinsic_heat, "SEAM", 0.0)
+    plain = error()
+    assert mended.max() < 0.5 * np.sqrt(factor) < 0.7 * plain.max()
+    assert mended.std() < 0.7 * plain.std()
+    assert mended.min() > plain.min() - 0.3
+    # away from seams nothing changes
+    early = exact[far] < 2.0
+    assert np.abs(mended - plain)[early].max() < 0.15
 
 
 def test_distances_cross_the_edges_of_the_unit():

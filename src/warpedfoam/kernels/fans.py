@@ -33,9 +33,9 @@ def fan_integrals(
     Rays run from a centre c to the arcs x(ξ) and down to the surface along the loop's own axis m, the
     direction of its vector area ½ ∮ x × dx: dA = r m · ((x − c) × x') / (n · m) dr dξ.
     ``shifts`` (m, 3) move the half-arcs of each loop together. Gauss points: ``n_radial`` on a ray, two
-    more than the film's order along it (three where rays have two).
+    more than the film's order along it, but no fewer than on a ray (three where rays have two).
     """
-    xi, omega = gauss(rule.order + 2 if n_radial > 2 else 3)
+    xi, omega = gauss(max(rule.order + 2, n_radial) if n_radial > 2 else 3)
     values = rule.interpolation(xi)
     curve = np.tensordot(values, points, 1)
     slope = np.tensordot(omega[:, None] * (values @ rule.derivative), points, 1)

@@ -7,11 +7,14 @@ f = Σ φ_i g_i / Σ φ_i, four times differentiable.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from warpedfoam.arrays import Floats, Ints
+from warpedfoam.kernels.jets_compiled import RECORD, compiled
 
 #: Exponents of u and v in the jets.
 POWERS = tuple((i, total - i) for total in range(5) for i in range(total, -1, -1))
@@ -19,6 +22,8 @@ POWERS = tuple((i, total - i) for total in range(5) for i in range(total, -1, -1
 WIDTH, ROUNDS, STIFFNESS = 2.0, 3, 1e-11
 #: Nodes per pass of the fit, points per pass of the level function.
 FIT_CHUNK, CHUNK = 8192, 1536
+#: Nodes from which on compiling is worth its second or two, if numba is there.
+MANY = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +39,20 @@ class Jets:
     spacing: Floats
     reach: Floats
     coefficients: Floats
+
+    @cached_property
+    def balls(self) -> Floats:
+        """Points and reaches side by side, (n, 4)."""
+        return np.ascontiguousarray(self.records[:, :4])
+
+    @cached_property
+    def records(self) -> Floats:
+        """All of a node's numbers side by side, (n, 29), for `warpedfoam.kernels.jets_compiled`."""
+        columns = [self.points, self.reach[:, None], self.spacing[:, None]]
+        columns += [self.frames.reshape(-1, 9), self.coefficients]
+        out = np.hstack(columns)
+        assert out.shape[1] == RECORD
+        return out
 
 
 def frames_of(normals: Floats) -> Floats:
@@ -54,6 +73,12 @@ def fit_jets(points: Floats, normals: Floats, spacing: Floats, reach: Floats, ne
     """
     coefficients = np.empty((len(points), len(POWERS)))
     frames = np.empty((len(points), 3, 3))
+    fast = compiled() if len(points) >= MANY else None
+    if fast is not None:
+        lost = fast[0](points, normals, spacing, neighbours, WIDTH, ROUNDS, STIFFNESS, frames, coefficients)
+        if lost >= 0:
+            raise np.linalg.LinAlgError(f"no jet fits round node {lost}")
+        return Jets(points, frames, spacing, reach, coefficients)
     stiffness = STIFFNESS * np.diag([0.0] + [1.0] * (len(POWERS) - 1))
     for lo in range(0, len(points), FIT_CHUNK):
         part = slice(lo, lo + FIT_CHUNK)
@@ -90,6 +115,9 @@ def blended(
     ``nearest`` (m,) is a node next to each point, ``candidates`` (n, k) the nodes that may reach points
     next to a node, padded with −1. Where no ball reaches, the nearest node's tangent plane takes over.
     """
+    blend = compiled_blend(jets)
+    if blend is not None:
+        return blended_fast(blend, jets, points, nearest, candidates, second)
     value, gradient = np.empty(len(points)), np.empty((len(points), 3))
     hessian = np.empty((len(points), 3, 3)) if second else None
     for lo in range(0, len(points), CHUNK):
@@ -99,6 +127,23 @@ def blended(
         if hessian is not None and h is not None:
             hessian[part] = h
     return value, gradient, hessian
+
+
+def compiled_blend(jets: Jets) -> Callable[..., None] | None:
+    """What `blended_fast` needs, or None for few nodes or without numba."""
+    fast = compiled() if len(jets.points) >= MANY else None
+    return None if fast is None else fast[1]
+
+
+def blended_fast(
+    blend: Callable[..., None], jets: Jets, points: Floats, nearest: Ints, candidates: Ints, second: bool
+) -> tuple[Floats, Floats, Floats | None]:
+    """`blended`, compiled; ``nearest`` need only be near."""
+    count = len(points)
+    value, gradient = np.empty(count), np.empty((count, 3))
+    hessian = np.empty((count if second else 0, 3, 3))
+    blend(jets.balls, jets.records, points, nearest, candidates, second, value, gradient, hessian)
+    return value, gradient, hessian if second else None
 
 
 def _blended(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,9 @@ LINE_STEPS, NEAREST_STEPS = 12, 200
 #: Rounds of the even lattice.
 LATTICE_ROUNDS = 40
 
+#: f, its gradient and, if asked for, second derivatives, at new places of some points of `LevelSurface.near`.
+Look = Callable[[Floats, "Ints | slice", bool], tuple[Floats, Floats, Floats | None]]
+
 
 class LevelSurface(ABC):
     """Base of surfaces given by f = 0, with f growing outwards (into the gap).
@@ -48,6 +51,14 @@ class LevelSurface(ABC):
     @abstractmethod
     def level(self, points: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
         """f (n,), its gradient (n, 3), and its second derivatives (n, 3, 3) if asked for."""
+
+    def near(self, points: Floats) -> Look:  # noqa: ARG002
+        """`level` for points that will move a little: whatever can be found once is found here."""
+        return lambda places, _, second: self.level(places, second=second)
+
+    def least_rays(self, n_loops: int) -> int:  # noqa: ARG002
+        """Fewest points on a ray from the centre of one of ``n_loops`` loops that resolve the surface."""
+        return 0
 
     @abstractmethod
     def triangulate(self, n_nodes: int) -> TriangleMesh:
@@ -105,10 +116,10 @@ class LevelSurface(ABC):
         """The points moved along their axes to the surface; NaN where a line does not meet it."""
         out = points.copy()
         live = np.arange(len(points))
-        scale = self.size
+        scale, look = self.size, self.near(points)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             for _ in range(LINE_STEPS):
-                value, gradient, _ = self.level(out[live], second=False)
+                value, gradient, _ = look(out[live], live, False)
                 step = value / arcs.dots(gradient, axes[live])
                 step = np.clip(step, -0.2 * scale, 0.2 * scale)
                 out[live] -= step[:, None] * axes[live]
@@ -139,10 +150,10 @@ class LevelSurface(ABC):
     def _nearest(self, p: Floats) -> Floats:
         """Nearest points of f = 0."""
         x = p.copy()
-        live = np.arange(len(p))
+        live, look = np.arange(len(p)), self.near(p)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             for _ in range(NEAREST_STEPS):
-                value, gradient, _ = self.level(x[live], second=False)
+                value, gradient, _ = look(x[live], live, False)
                 square = arcs.dots(gradient, gradient)
                 # first order: the foot of p on the tangent plane of the level set through x, moved to f = 0
                 ahead = p[live] - x[live]
@@ -188,15 +199,16 @@ class LevelSurface(ABC):
         A step or two and a look at where they led; only lines that are not there yet go on.
         """
         near, live, scale = points.copy(), np.arange(len(points)), self.size
+        look = self.near(points)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             for _ in range(2):
-                value, gradient, _ = self.level(near[live], second=False)
+                value, gradient, _ = look(near[live], live, False)
                 step = np.clip(value / arcs.dots(gradient, axes[live]), -0.2 * scale, 0.2 * scale)
                 near[live] -= step[:, None] * axes[live]
                 live = live[~(np.abs(step) <= 3e-5 * scale)]
                 if not live.size:
                     break
-            value, gradient, bend = self.level(near, second=second)
+            value, gradient, bend = look(near, slice(None), second)
             left = value / arcs.dots(gradient, axes)
             late = np.flatnonzero(~(np.abs(left) <= 1e-9 * scale))
             if late.size:
@@ -401,10 +413,11 @@ class LevelSurface(ABC):
         first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]
         start, end = np.where(back, last, first), np.where(back, first, last)
         shifts = loop_shifts(start, end, loops, self.period)
+        rays = layer.rays if layer.rays == 2 else max(layer.rays, self.least_rays(len(loops.starts)))
         points = placed.points
         if self.rim is not None:
             points, loops = with_walls(self.rim, placed.rule, points, loops, start, end)
-        return fan_integrals(placed.rule, points, loops, shifts, self.foot, land, self._unit, layer.rays)
+        return fan_integrals(placed.rule, points, loops, shifts, self.foot, land, self._unit, rays)
 
 
 def _normal_shape(gradient: Floats, second: Floats | None) -> tuple[Floats, Floats | None]:

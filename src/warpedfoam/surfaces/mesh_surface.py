@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -16,9 +16,10 @@ from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_integer, frozen
 from warpedfoam.errors import MeshError
-from warpedfoam.kernels.jets import Jets, blended, fit_jets
+from warpedfoam.kernels.height_arcs import dots
+from warpedfoam.kernels.jets import Jets, blended, blended_fast, compiled_blend, fit_jets
 from warpedfoam.surfaces.files import read_mesh
-from warpedfoam.surfaces.level import LevelSurface
+from warpedfoam.surfaces.level import LevelSurface, Look
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.protocol import SIZES
 
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 #: Radius of a node's ball in its spacings and in its longest edge; rings of the fit; neighbours kept.
 REACH, COVER, RINGS, MOST = 1.5, 0.75, 3, 48
+#: Quadrature points to an edge from a bubble's centre to its rim, and two more: fewer miss the ripples of
+#: the curvatures from node to node. Nodes per pass of the search for neighbours.
+RAYS, PASS = 1.6, 32_768
 #: Sheets whose normals differ by more than this cosine do not blend.
 SAME_SHEET = 0.2
 #: Farthest from the origin, in extents of the mesh: beyond it round-off shows in the forces. Largest
@@ -191,6 +195,31 @@ class MeshSurface(LevelSurface):
         nearest = np.asarray(tree.query(finite)[1], dtype=np.int64)
         return blended(jets, points, nearest, candidates, second=second)
 
+    def near(self, points: Floats) -> Look:
+        """The blended jets, the nearest nodes found once where compiled loops can follow them."""
+        jets, candidates, tree = self._jets
+        blend = compiled_blend(jets)
+        if blend is None:
+            return super().near(points)
+        start = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
+        nearest = np.asarray(tree.query(start)[1], dtype=np.int64)
+
+        def look(places: Floats, which: Ints | slice, second: bool) -> tuple[Floats, Floats, Floats | None]:
+            node = nearest[which]
+            away = places - start[which]
+            far = np.flatnonzero(~(dots(away, away) <= (0.5 * jets.spacing[node]) ** 2))
+            if far.size:
+                node = node.copy()
+                node[far] = tree.query(np.nan_to_num(places[far], nan=0.0, posinf=0.0, neginf=0.0))[1]
+            return blended_fast(blend, jets, places, node, candidates, second)
+
+        return look
+
+    def least_rays(self, n_loops: int) -> int:
+        """In proportion to the edges between a bubble's centre and its rim."""
+        radius = float(np.sqrt(self.area / (np.pi * max(n_loops, 1))))
+        return int(np.ceil(RAYS * radius / self.source.mean_edge)) + 2
+
     def triangulate(self, n_nodes: int) -> TriangleMesh:
         """The given mesh, its nodes moved to the smooth surface; halved edges until there are enough."""
         count = as_integer(n_nodes, "n_nodes", minimum=4)
@@ -273,35 +302,52 @@ def _rings(mesh: TriangleMesh, rings: int) -> csr_array:
     return out
 
 
-def _padded(points: Floats, graph: csr_array, most: int) -> Ints:
-    """The nearest of each row's columns as (n, k) with k ≤ ``most``, padded with −1."""
-    row = np.repeat(np.arange(len(points)), np.diff(graph.indptr))
-    column = np.asarray(graph.indices, dtype=np.int64)
-    distance = ((points[column] - points[row]) ** 2).sum(axis=1)
-    order = np.lexsort((distance, row))
-    row, column = row[order], column[order]
-    first = np.searchsorted(row, np.arange(len(points)))
-    rank = np.arange(len(row)) - first[row]
-    kept = rank < most
-    out = np.full((len(points), int(rank[kept].max()) + 1), -1, dtype=np.int64)
-    out[row[kept], rank[kept]] = column[kept]
+def _passes(graph: csr_array) -> Iterator[tuple[Ints, Ints, Ints]]:
+    """Nodes of each pass, and row and column of their entries of the graph."""
+    for lo in range(0, graph.shape[0], PASS):
+        nodes = np.arange(lo, min(lo + PASS, graph.shape[0]))
+        row = np.repeat(nodes, np.diff(graph.indptr[lo : lo + len(nodes) + 1]))
+        column = graph.indices[graph.indptr[lo] : graph.indptr[lo + len(nodes)]]
+        yield nodes, row, np.asarray(column, dtype=np.int64)
+
+
+def _table(parts: list[tuple[Ints, Ints]], count: int) -> Ints:
+    """Columns of each row as (count, k), padded with −1, from entries sorted by row."""
+    sizes = np.concatenate([np.bincount(row - row[0]) for row, _ in parts])
+    out = np.full((count, int(sizes.max())), -1, dtype=np.int64)
+    for row, column in parts:
+        first = np.searchsorted(row, row)
+        out[row, np.arange(len(row)) - first] = column
     return out
+
+
+def _padded(points: Floats, graph: csr_array, most: int) -> Ints:
+    """Each row's columns as (n, k), padded with −1; the nearest ``most`` of longer rows."""
+    parts = []
+    for nodes, row, column in _passes(graph):
+        size = np.bincount(row - nodes[0])
+        long = size[row - nodes[0]] > most
+        if long.any():
+            r, c = row[long], column[long]
+            order = np.lexsort((((points[c] - points[r]) ** 2).sum(axis=1), r))
+            kept = np.arange(len(r)) - np.searchsorted(r, r) < most
+            r, c = r[order][kept], c[order][kept]
+            row, column = np.concatenate([row[~long], r]), np.concatenate([column[~long], c])
+            order = np.argsort(row, kind="stable")
+            row, column = row[order], column[order]
+        parts.append((row, column))
+    return _table(parts, len(points))
 
 
 def _candidates(jets: Jets, rings: csr_array, longest: Floats) -> Ints:
     """Nodes whose balls may reach points next to each node, on the same sheet."""
-    row = np.repeat(np.arange(len(longest)), np.diff(rings.indptr))
-    column = np.asarray(rings.indices, dtype=np.int64)
-    apart = np.linalg.norm(jets.points[column] - jets.points[row], axis=1)
-    normals = jets.frames[:, 2]
-    alike = np.einsum("lx,lx->l", normals[row], normals[column]) > SAME_SHEET
-    keep = ((apart < jets.reach[column] + COVER * longest[row]) & alike) | (row == column)
-    row, column = row[keep], column[keep]
-    first = np.searchsorted(row, np.arange(len(longest)))
-    rank = np.arange(len(row)) - first[row]
-    out = np.full((len(longest), int(rank.max()) + 1), -1, dtype=np.int64)
-    out[row, rank] = column
-    return out
+    normals, parts = np.ascontiguousarray(jets.frames[:, 2]), []
+    for _, row, column in _passes(rings):
+        apart = jets.points[column] - jets.points[row]
+        near = dots(apart, apart) < (jets.reach[column] + COVER * longest[row]) ** 2
+        keep = (near & (dots(normals[row], normals[column]) > SAME_SHEET)) | (row == column)
+        parts.append((row[keep], column[keep]))
+    return _table(parts, len(longest))
 
 
 def _halved(mesh: TriangleMesh) -> tuple[Floats, Ints]:

@@ -12,6 +12,7 @@ from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.places import Places
 from warpedfoam.tessellate.colouring import colour_seeds
+from warpedfoam.tessellate.domains import WHOLE, DividedHeat
 from warpedfoam.tessellate.geodesics import HeatGeodesics
 
 #: Nearest seeds kept per node, and how far apart (in mean spacings) seeds of one colour lie.
@@ -44,8 +45,16 @@ class SeedFields:
         return np.take_along_axis(self.squares[nodes], place[..., None], axis=-1)[..., 0], found
 
 
+def heat_solver(mesh: TriangleMesh, t: float) -> HeatGeodesics | DividedHeat:
+    """What `seed_fields` measures with: the whole mesh factored once or, if it is large, domains of it."""
+    if mesh.n_nodes <= WHOLE:
+        return HeatGeodesics(mesh, t)
+    mesh.require_surface()
+    return DividedHeat(mesh, t)
+
+
 def seed_fields(
-    heat: HeatGeodesics,
+    heat: HeatGeodesics | DividedHeat,
     seeds: Floats,
     spacing: float,
     progress: Callable[[float], None] | None = None,
@@ -59,7 +68,8 @@ def seed_fields(
 
     Parameters
     ----------
-    heat : HeatGeodesics
+    heat : HeatGeodesics or DividedHeat
+        See `heat_solver`.
     seeds : (n, 3) array
         On the surface, distinct.
     spacing : float
@@ -75,23 +85,36 @@ def seed_fields(
     _, source = Places(nodes, period).nearest(seeds)
     colours = colour_seeds(seeds, APART * spacing, period)
     # seeds that share a source node must not share a solve: they do not, being close together
-    order = np.argsort(colours[near.ravel()], kind="stable")
-    n_colours = int(colours.max()) + 1
-    bounds = np.searchsorted(colours[near.ravel()][order], np.arange(n_colours + 1))
-    by_colour = np.argsort(colours, kind="stable")
-    first = np.searchsorted(colours[by_colour], np.arange(n_colours + 1))
+    if isinstance(heat, DividedHeat):
+        distance = heat.from_seeds(source, colours, near, chord, progress)
+    else:
+        distance = _whole(heat, source, colours, near, progress)
     shift = nearest_image(nodes[:, None, :] - nodes[source[near]], period)
     straight = np.einsum("nki,nki->nk", shift, shift)
-    least = (np.sqrt(straight) - heat.mesh.mean_edge).ravel()
-    squares = np.empty(near.size)
+    np.maximum(distance, np.maximum(np.sqrt(straight) - heat.mesh.mean_edge, 0.0), out=distance)
+    squares = distance**2 + chord**2 - straight
+    return SeedFields(heat.mesh, near.astype(np.int64), squares)
+
+
+def _whole(
+    heat: HeatGeodesics,
+    source: Ints,
+    colours: Ints,
+    near: Ints,
+    progress: Callable[[float], None] | None,
+) -> Floats:
+    """Distances (n_nodes, k) from the seeds ``near`` each node, less those of the seeds' own nodes."""
+    count, wanted = near.shape[1], colours[near.ravel()]
+    order = np.argsort(wanted, kind="stable")
+    n_colours = int(colours.max()) + 1
+    bounds = np.searchsorted(wanted[order], np.arange(n_colours + 1))
+    by_colour = np.argsort(colours, kind="stable")
+    first = np.searchsorted(colours[by_colour], np.arange(n_colours + 1))
+    out = np.empty(near.size)
     for colour in range(n_colours):
-        members = by_colour[first[colour] : first[colour + 1]]
-        field = heat.distances(source[members])
+        field = heat.distances(source[by_colour[first[colour] : first[colour + 1]]])
         take = order[bounds[colour] : bounds[colour + 1]]
-        seed = near.ravel()[take]
-        distance = np.maximum(field[take // count] - field[source[seed]], np.maximum(least[take], 0.0))
-        squares[take] = distance**2
+        out[take] = field[take // count] - field[source[near.ravel()[take]]]
         if progress is not None:
             progress((colour + 1) / n_colours)
-    squares = squares.reshape(near.shape) + chord**2 - straight
-    return SeedFields(heat.mesh, near.astype(np.int64), squares)
+    return out.reshape(near.shape)
