@@ -14,9 +14,22 @@ from warpedfoam import startup  # first, before anything slow
 
 # isort: split
 from warpedfoam.analysis import (
+    BondOrder,
+    ChargeEnergies,
+    ChargeProfile,
+    Correlations,
+    DefectReport,
     EquilibriumReport,
+    FoamStatistics,
     SideDistribution,
+    bond_order,
+    charge_energies,
+    charge_in,
+    charge_profile,
+    correlations,
+    defects,
     equilibrium_report,
+    foam_statistics,
     side_distribution,
 )
 from warpedfoam.cell import HeleShawCell
@@ -69,14 +82,20 @@ from warpedfoam.tessellate import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "BondOrder",
     "CellNetwork",
+    "ChargeEnergies",
+    "ChargeProfile",
     "ConvergenceError",
+    "Correlations",
     "Cylinder",
+    "DefectReport",
     "Ellipsoid",
     "EquilibriumReport",
     "FileFormatError",
     "FlatTorus",
     "Foam",
+    "FoamStatistics",
     "GeodesicDistances",
     "Graph",
     "HeatGeodesics",
@@ -97,7 +116,14 @@ __all__ = [
     "Torus",
     "TriangleMesh",
     "WarpedFoamError",
+    "bond_order",
+    "charge_energies",
+    "charge_in",
+    "charge_profile",
+    "correlations",
+    "defects",
     "equilibrium_report",
+    "foam_statistics",
     "geodesic_distances",
     "geodesic_report",
     "load",
