@@ -52,7 +52,17 @@ from warpedfoam.io import (
 )
 from warpedfoam.moves import T1Event, t1
 from warpedfoam.network import CellNetwork, network_from_loops
-from warpedfoam.plot import plot_foam, save_picture
+from warpedfoam.plot import (
+    plot_charge_energies,
+    plot_charge_profile,
+    plot_correlations,
+    plot_defects,
+    plot_foam,
+    plot_order,
+    plot_sides,
+    save_figure,
+    save_picture,
+)
 from warpedfoam.relax import Relaxation, relax
 from warpedfoam.surfaces import (
     Cylinder,
@@ -129,10 +139,17 @@ __all__ = [
     "load",
     "mesh_report",
     "network_from_loops",
+    "plot_charge_energies",
+    "plot_charge_profile",
+    "plot_correlations",
+    "plot_defects",
     "plot_foam",
+    "plot_order",
+    "plot_sides",
     "read_mesh",
     "relax",
     "save",
+    "save_figure",
     "save_picture",
     "side_distribution",
     "t1",

@@ -37,6 +37,8 @@ class Circuits:
         Number of closed walks that make up the rim.
     euler : (n_regions,) integer array
         Euler number: 1 if the region is a disk.
+    turning : (n_regions,) integer array
+        Left turns less right turns, 6 euler − charge by Gauss–Bonnet.
     charge : (n_regions,) integer array
         Total charge Q; laid-out directions turn by −60° Q in one round of a disk.
     advance : (n_regions, 2) integer array
@@ -53,6 +55,7 @@ class Circuits:
     direction: Ints
     walks: Ints
     euler: Ints
+    turning: Ints
     charge: Ints
     advance: Ints
     hexagons: Ints
@@ -138,6 +141,7 @@ def circuits(network: CellNetwork, labels: Ints, n_regions: int) -> Circuits:
         frozen(heading % 6),
         frozen(walks),
         frozen(euler),
+        frozen(_sums(turn, region, n_regions)),
         frozen(charge),
         frozen(advance),
         frozen(hexagons // 6),

@@ -135,7 +135,7 @@ def correlations(
     if not farthest > 0.0:
         raise ResolutionError("correlations need a foam of at least two bubbles")
     count = max(1, int(np.ceil(farthest / width - 1e-9)))
-    edges = unit * width * np.arange(count + 1)
+    edges: Floats = (unit * width) * np.arange(count + 1, dtype=np.float64)
     n_pairs = np.zeros(count, dtype=np.int64)
     order, charge = np.zeros(count), np.zeros(count)
     order_norm = charge_norm = 0.0
@@ -153,7 +153,8 @@ def correlations(
     # a bubble without any order or charge leaves nothing to divide by, and nothing to divide
     order_mean, charge_mean = (max(v / n_sources_used, 1e-300) for v in (order_norm, charge_norm))
     safe = np.maximum(n_pairs, 1)
-    screening = 1.0 + np.append(np.zeros(1), np.cumsum(charge)) / max(charge_norm, 1e-300)
+    screening = np.ones(count + 1)
+    screening[1:] += np.cumsum(charge) / max(charge_norm, 1e-300)
     return Correlations(
         frozen(0.5 * (edges[1:] + edges[:-1])),
         frozen(edges),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -84,7 +84,7 @@ def plot_foam(
     colours = bubble_colours(foam, color_by)
     figure, axes = painted_foam(foam, colours, view=view, size=size, title=title)
     if colours.name in ("charge", "sides"):
-        _legend(figure, foam, colours)
+        counted_sides(figure, foam, colours)
     else:
         colour_bar(figure, axes, colours)
     return figure
@@ -96,14 +96,15 @@ class Strokes:
 
     Attributes
     ----------
-    films : (k,) integer array
-        Films drawn otherwise, in ``film_rgb`` (k, 3) and ``film_widths`` (k,) times their plain width.
+    halves : (k,) integer array
+        Half-films drawn otherwise, in ``film_rgb`` (k, 3) and ``film_widths`` (k,) times their plain width.
+        Where a surface repeats, only the image of the film beside the half-film's bubble is.
     marks : (m, 2, 3) array
         Segments on the surface, each on a bubble ``mark_bubble`` (m,), in ``mark_rgb`` (m, 3) and
         ``mark_widths`` (m,) times the films' plain width.
     """
 
-    films: Ints
+    halves: Ints
     film_rgb: Floats
     film_widths: Floats
     marks: Floats
@@ -250,9 +251,14 @@ def _paint(
     fill *= shades(np.where(front[:, None], normals, -normals))[:, None]
 
     curves, film = foam.film_curves(segments + 1), np.arange(foam.network.n_films)
+    special = None if strokes is None else strokes.halves >> 1
     if foam.loop_shifts is not None:
         # a bubble that reaches over the edge of the unit is drawn whole, with its own images of its films
         film = foam.network.loops.halves >> 1
+        if strokes is not None:
+            place = np.empty(2 * foam.network.n_films, dtype=np.int64)
+            place[foam.network.loops.halves] = np.arange(len(film))
+            special = place[strokes.halves]
         curves = curves[film] + foam.loop_shifts[:, None]
     middles = 0.5 * (curves[:, 1:] + curves[:, :-1]).reshape(-1, 3)
     towards = view.project(surface.normals(middles))[:, 2] > 0.0
@@ -265,13 +271,16 @@ def _paint(
     np.maximum.at(span, patches.triangle_bubble[seen], np.ptp(corners[:, :, 2], axis=1))
     beside = np.maximum(span[foam.network.left], span[foam.network.right])[film]
     lift = np.repeat(beside, segments)[towards] + np.ptp(pieces[:, :, 2], axis=1)
-    drawn = np.repeat(film, segments)[towards]
     thin = _film_width(foam.n_bubbles)
-    ink = np.tile(as_rgb(FILM_COLOUR) / 255.0, (foam.network.n_films, 1))
-    widths = np.full(foam.network.n_films, thin)
-    if strokes is not None:
-        ink[strokes.films], widths[strokes.films] = strokes.film_rgb, thin * strokes.film_widths
-    ink, widths = ink[drawn], widths[drawn]
+    ink = np.tile(as_rgb(FILM_COLOUR) / 255.0, (len(film), 1))
+    widths = np.full(len(film), thin)
+    if strokes is not None and special is not None:
+        ink[special], widths[special] = strokes.film_rgb, thin * strokes.film_widths
+        # above plain films in the same place
+        over = np.zeros(len(film))
+        over[special] = beside[special]
+        lift += np.repeat(over, segments)[towards]
+    ink, widths = (np.repeat(a, segments, axis=0)[towards] for a in (ink, widths))
     if strokes is not None and len(strokes.marks):
         middle = strokes.marks.mean(axis=1)
         shown = view.project(surface.normals(middle))[:, 2] > 0.0
@@ -322,7 +331,12 @@ def _heading(foam: Foam) -> str:
     return f"{count} bubble{'' if count == 1 else 's'} on {article} {kind} · energy {foam.energy:.6g}"
 
 
-def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
+def counted_sides(
+    figure: Figure,
+    foam: Foam,
+    colours: BubbleColours,
+    loc: Literal["outside right center", "outside right upper"] = "outside right center",
+) -> None:
     """One entry per number of sides that occurs, with how many bubbles have it."""
     from matplotlib.patches import Patch
 
@@ -349,7 +363,7 @@ def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
     figure.legend(
         handles=[Patch(facecolor=tuple(c), edgecolor="#555555", linewidth=0.6, label=t) for c, t in entries],
         title="sides n, charge q = 6 − n:  bubbles" if by_charge else "sides n:  bubbles",
-        loc="outside right center",
+        loc=loc,
         frameon=False,
         fontsize=11,
         title_fontsize=11,
