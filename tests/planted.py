@@ -165,7 +165,7 @@ def turned(foam: wf.Foam, matrix: np.ndarray) -> wf.Foam:
     before = np.empty_like(network.next)
     before[network.next] = np.arange(len(before))
     mirrored = wf.CellNetwork(before, network.origin[np.arange(len(before)) ^ 1], network.bubble)
-    return wf.Foam(foam.cell, mirrored, foam.vertex_points @ matrix.T, -foam.film_offsets[:, ::-1])
+    return wf.Foam(foam.cell, mirrored, foam.vertex_points @ matrix.T, foam.film_offsets[:, ::-1])
 
 
 def relabelled(foam: wf.Foam, seed: int) -> tuple[wf.Foam, np.ndarray]:

@@ -135,31 +135,25 @@ def _connected(network: CellNetwork, chosen: Bools) -> tuple[Ints, int]:
 
 
 def _filled(network: CellNetwork, cluster_of: Ints, count: int, charges: Ints) -> Ints:
-    """The clusters with their holes: disks without charge that border one cluster only.
+    """The clusters with their holes: grains without charge that are disks and border one cluster only.
 
-    If everything outside a cluster is such a disk, the largest is not a hole.
+    The largest grain of the foam is never a hole: it is what surrounds the clusters.
     """
     grain, n_grains = _connected(network, (charges == 0) & (network.bubble_euler == 1))
-    around = circuits(
-        network, np.where(np.isin(grain, np.unique(grain[rim_bubbles(network)])), -1, grain), n_grains
-    )
-    half = around.halves
+    if not count or not n_grains:
+        return cluster_of
+    size = np.bincount(grain[grain >= 0], minlength=n_grains)
+    open_ended = np.zeros(n_grains + 1, dtype=bool)
+    open_ended[grain[rim_bubbles(network)]] = True
+    open_ended[-1] = False
+    walk = circuits(network, np.where(open_ended[grain], -1, grain), n_grains)
+    beside = cluster_of[network.bubble[walk.halves ^ 1]]
     lowest = np.full(n_grains, np.iinfo(np.int64).max)
     highest = np.full(n_grains, -1, dtype=np.int64)
-    np.minimum.at(lowest, around.region, cluster_of[network.bubble[half ^ 1]])
-    np.maximum.at(highest, around.region, cluster_of[network.bubble[half ^ 1]])
-    hole = np.flatnonzero(around.disk & (lowest == highest) & (highest >= 0))
-    owner = highest[hole]
-    size = np.bincount(grain[grain >= 0], minlength=n_grains)[hole]
-    order = np.lexsort((size, owner))
-    last = np.ones(len(order), dtype=bool)
-    last[:-1] = np.diff(owner[order]) != 0
-    # a cluster whose rim consists of holes only: its largest is the outside
-    walks = circuits(network, cluster_of, count).walks
-    all_holes = np.bincount(owner, minlength=count) == walks
-    kept = order[~(last & all_holes[owner[order]])]
-    target = np.full(n_grains + 1, -1, dtype=np.int64)
-    target[hole[kept]] = owner[kept]
+    np.minimum.at(lowest, walk.region, beside)
+    np.maximum.at(highest, walk.region, beside)
+    hole = walk.disk & (lowest == highest) & (highest >= 0) & (size < size.max())
+    target = np.append(np.where(hole, highest, -1), -1)
     out: Ints = np.where(grain >= 0, target[grain], cluster_of)
     return out
 
@@ -308,6 +302,7 @@ def _burgers(foam: Foam, walk: Circuits, position: Floats) -> tuple[Floats, Floa
     length = np.bincount(walk.region, np.abs(real), count)
     turn = overlap / np.maximum(np.abs(overlap), 1e-300)
     vector = turn * (p * BASIS[0] + q * BASIS[1]) / np.sqrt(3.0)
-    burgers = vector.real[:, None] * frames[:, 0] + vector.imag[:, None] * frames[:, 1]
+    # no −0.0 in tables
+    burgers = vector.real[:, None] * frames[:, 0] + vector.imag[:, None] * frames[:, 1] + 0.0
     fit = np.where(walk.closed, np.abs(overlap) / np.maximum(length, 1e-300), 0.0)
     return burgers, fit, squared
