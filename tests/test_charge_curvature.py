@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import warpedfoam as wf
-from warpedfoam.analysis import band_curvatures
+from warpedfoam.analysis import KINDS, band_curvatures
 from warpedfoam.cli.app import app
 
 from .io_foams import bubble_on_torus, sphere_foam, torus_foam
@@ -230,3 +231,15 @@ def test_command_for_readers(tmp_path: Path, ensemble: list[wf.Foam]) -> None:
     assert CliRunner().invoke(app, [*given, "--quiet"]).output == ""
     for bad in (["nowhere.npz"], [str(tmp_path / "foam.npz"), "--tiny", "7"]):
         assert CliRunner().invoke(app, ["defects", *bad]).exit_code == 2
+
+
+def test_page_on_defects() -> None:
+    """The code of the page runs and does what its text says."""
+    text = (Path(__file__).parents[1] / "docs" / "defects.md").read_text(encoding="utf-8")
+    space: dict = {"__name__": "__main__"}
+    for block in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+        exec(compile(block, "defects.md", "exec"), space)
+    assert space["profile"].charges.shape == (3, 6)
+    assert space["found"].screening_length > 0.0
+    for kind in KINDS:
+        assert f"`{kind}`" in text
