@@ -182,3 +182,20 @@ def relabelled(foam: wf.Foam, seed: int) -> tuple[wf.Foam, np.ndarray]:
     points, offsets = np.empty_like(foam.vertex_points), np.empty_like(foam.film_offsets)
     points[vertices], offsets[film] = foam.vertex_points, foam.film_offsets
     return wf.Foam(foam.cell, wf.CellNetwork(following, origin, bubble), points, offsets), bubbles
+
+
+def with_markers(foam: wf.Foam, films: np.ndarray) -> wf.Foam:
+    """The foam with a marker vertex in the middle of each of ``films``."""
+    network = foam.network
+    following, origin, bubble = list(network.next), list(network.origin), list(network.bubble)
+    for film in films.tolist():
+        along, back, new, vertex = 2 * film, 2 * film + 1, len(following), max(origin) + 1
+        behind = following.index(back)
+        following += [following[along], back]
+        following[along], following[behind] = new, new + 1
+        origin += [vertex, origin[back]]
+        origin[back] = vertex
+        bubble += [bubble[along], bubble[back]]
+    middles = foam.film_curves_at(np.array([0.5]))[films, 0]
+    points = np.vstack([foam.vertex_points, foam.cell.surface.project(middles)])
+    return wf.Foam(foam.cell, wf.CellNetwork(following, origin, bubble), points)

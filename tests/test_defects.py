@@ -15,7 +15,7 @@ from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.moves.t1 import rewire
 
 from .io_foams import bubble_on_torus, lone_bubble, torus_foam
-from .nets import NETS, hemispheres, lunes
+from .nets import NETS, hemispheres, lunes, spherical_voronoi_foam
 from .planted import (
     at,
     bond,
@@ -29,6 +29,7 @@ from .planted import (
     relabelled,
     subdivided,
     turned,
+    with_markers,
     without,
 )
 
@@ -394,6 +395,65 @@ def test_random_foams_keep_their_total_charge(surface: wf.Surface, seed: int) ->
     assert (used <= np.abs(q)).all()
     assert (q[found.dislocations.positive] > 0).all()
     assert (q[found.dislocations.negative] < 0).all()
+
+
+@pytest.mark.parametrize("name", ["far dislocations", "walls", "vacancy by a fan", "interstitial", "scar"])
+def test_markers_are_no_corners(planted: dict[str, wf.Foam], name: str) -> None:
+    """Films in two pieces, on the rims of clusters too, change nothing but the round-off."""
+    foam = planted[name]
+    films = np.flatnonzero(foam.network.charges[foam.network.left])
+    marked = with_markers(foam, films)
+    assert len(marked.network.markers) == len(films)
+    one, two = wf.defects(foam), wf.defects(marked, tiny=0.0)
+    assert one.kinds == two.kinds
+    for column in ("size", "charge", "pairs", "missing", "burgers_squared"):
+        np.testing.assert_array_equal(getattr(one.clusters, column), getattr(two.clusters, column))
+    np.testing.assert_allclose(one.clusters.burgers, two.clusters.burgers, atol=2e-3)
+
+
+def test_clusters_across_the_edge_of_the_unit(planted: dict[str, wf.Foam]) -> None:
+    """Where the unit is cut does not matter, also to a cluster that lies across two cuts."""
+    foam = planted["vacancy by a triangle"]
+    period = foam.cell.surface.period
+    place = wf.defects(foam).clusters.position[0]
+    edge = np.array([0.5 * period[0], 0.5 * period[1], 0.0]) - place
+    other = wf.Foam(
+        foam.cell, foam.network, nearest_image(foam.vertex_points + edge, period), foam.film_offsets
+    )
+    one, two = wf.defects(foam).clusters, wf.defects(other).clusters
+    np.testing.assert_allclose(one.gyration, two.gyration, rtol=1e-9)
+    gap = nearest_image(two.position - one.position - edge, period)
+    np.testing.assert_allclose(gap, 0.0, atol=1e-9)
+
+
+def test_direction_of_burgers_vectors_by_hand() -> None:
+    """Each film of the rim turned to the tangent plane by scipy's rotations, on a sphere of few bubbles."""
+    from scipy.spatial.transform import Rotation
+
+    foam = spherical_voronoi_foam(wf.HeleShawCell(wf.Sphere(1.0), 0.01), wf.Sphere(1.0).random_points(60, 3))
+    network = foam.network
+    pairs = wf.defects(foam).dislocations
+    rows = np.flatnonzero(pairs.transported & (pairs.multiplicity == 1))
+    assert len(rows) >= 3
+    for row in rows:
+        labels = np.full(foam.n_bubbles, -1)
+        labels[[pairs.positive[row], pairs.negative[row]]] = 0
+        walk = circuits(network, labels, 1)
+        top = pairs.position[row]
+        e1 = np.cross(top, [0.3, 0.5, 0.8])
+        e1 /= np.linalg.norm(e1)
+        e2 = np.cross(top, e1)
+        overlap = 0.0
+        for half, turns in zip(walk.halves, walk.direction, strict=True):
+            start, end = foam.vertex_points[[network.origin[half], network.origin[half ^ 1]]]
+            middle = (start + end) / np.linalg.norm(start + end)
+            axis = np.cross(middle, top)
+            angle = np.arctan2(np.linalg.norm(axis), middle @ top)
+            turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+            film = turn.apply(end - start)
+            overlap += complex(film @ e1, film @ e2) * np.exp(-1j * np.pi / 3 * turns)
+        b = -(walk.advance[0] @ BASIS) / np.sqrt(3.0) * overlap / abs(overlap)
+        np.testing.assert_allclose(b.real * e1 + b.imag * e2, pairs.burgers[row], atol=1e-9)
 
 
 def test_dislocation_rules_agree() -> None:

@@ -154,7 +154,7 @@ def test_charges_screen_each_other() -> None:
     assert found.screening[0] == 1.0
     assert found.screening[-1] == pytest.approx(0.0, abs=1e-9)
     assert 0.5 < found.screening_length / found.spacing < 1.5
-    for foam in foams:
+    for foam in (*foams, random_foam(wf.Sphere(2.0))):
         assert excess_charges(foam).sum() == pytest.approx(0.0, abs=1e-9)
     few = wf.correlations(foams, n_sources=40, seed=3)
     np.testing.assert_array_equal(few.charge, wf.correlations(foams, n_sources=40, seed=3).charge)
@@ -183,6 +183,14 @@ def test_statistics_agree_with_a_count_by_hand() -> None:
         assert m == pytest.approx(np.mean(near), rel=1e-12)
     slope = np.polyfit(sides, foam.bubble_areas / foam.bubble_areas.mean(), 1)[0]
     assert found.lewis == pytest.approx(slope, rel=1e-9)
+    # least squares of the whole law with a alone free, bubble by bubble
+    mean, mu2 = found.mean_sides, found.mu2
+    seen = dict(zip(found.sides.tolist(), (found.sides * found.neighbour_sides).tolist(), strict=True))
+    misfit = [
+        sum((seen[n] - (mean - a) * n - mean * a - mu2) ** 2 for n in sides.tolist())
+        for a in found.aboav + np.array([-1e-3, 0.0, 1e-3])
+    ]
+    assert misfit[1] < min(misfit[0], misfit[2])
     assert wf.side_distribution(foam).mu2 == pytest.approx(found.mu2, rel=1e-12)
 
 

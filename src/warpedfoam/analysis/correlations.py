@@ -129,7 +129,8 @@ def correlations(
     some = None if n_sources is None else as_integer(n_sources, "n_sources", minimum=1)
     rng = as_generator(seed)
     unit = lattice_spacing(members[0])
-    pairs_of = [_pairs(foam, some, rng) for foam in members]
+    limit = np.inf if farthest is None else farthest * unit * (1.0 + 1e-9)
+    pairs_of = [_pairs(foam, some, rng, limit) for foam in members]
     if farthest is None:
         farthest = max(float(d[0].max(initial=0.0)) for d in pairs_of) / unit * (1.0 + 1e-12)
     if not farthest > 0.0:
@@ -177,7 +178,7 @@ def as_foams(foams: object) -> list[Foam]:
 
 
 def _pairs(
-    foam: Foam, some: int | None, rng: np.random.Generator
+    foam: Foam, some: int | None, rng: np.random.Generator, limit: float
 ) -> tuple[Floats, Floats, Floats, float, float, int]:
     """Distances, ψ6 and δ products of all ordered pairs (source, other), and Σ|ψ6|², Σδ² of the sources."""
     order = bond_order(foam)
@@ -187,7 +188,7 @@ def _pairs(
     sources = inside if some is None or some >= len(inside) else np.sort(rng.choice(inside, some, False))
     found: list[tuple[Floats, Floats, Floats]] = []
     for chunk in np.array_split(sources, max(1, len(sources) * foam.n_bubbles // _AT_ONCE)):
-        distance, angle = paths.distances(chunk)
+        distance, angle = paths.distances(chunk, limit)
         use = np.isfinite(distance)
         use[np.arange(len(chunk)), chunk] = False
         source, other = np.nonzero(use)

@@ -50,15 +50,15 @@ class BubblePaths:
         self.lengths = coo_array((np.tile(length, 2), pair), shape=(n, n)).tocsr()
         self._normals, self._frames = normals, frames
 
-    def distances(self, sources: Ints) -> tuple[Floats, Floats]:
-        """Distances (k, n) from ``sources`` (k,), infinite where no path leads, and angles (k, n).
+    def distances(self, sources: Ints, limit: float = np.inf) -> tuple[Floats, Floats]:
+        """Distances (k, n) from ``sources`` (k,), infinite beyond ``limit``, and angles (k, n).
 
         A vector with components z in a source's frame has z e^{iA} in the other's after transport along
         the path.
         """
         from scipy.sparse.csgraph import dijkstra
 
-        distance, before = dijkstra(self.lengths, indices=sources, return_predecessors=True)
+        distance, before = dijkstra(self.lengths, indices=sources, return_predecessors=True, limit=limit)
         n = distance.shape[1]
         here = np.arange(n)
         back = np.where(before < 0, here, before).astype(np.int64)
