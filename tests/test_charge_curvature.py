@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from pathlib import Path
@@ -201,6 +202,18 @@ def test_one_foam_has_no_error_bars() -> None:
 def test_bad_input(call, match: str) -> None:
     with pytest.raises((ValueError, TypeError), match=match):
         call(sphere_foam(20))
+
+
+def test_columns_as_csv(tmp_path: Path) -> None:
+    found = wf.defects(sphere_foam(40))
+    path = wf.write_columns_csv(tmp_path / "clusters.csv", found.columns("clusters"))
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert [row["kind"] for row in rows] == found.clusters.kind.tolist()
+    assert [float(row["burgers_y"]) for row in rows] == found.clusters.burgers[:, 1].tolist()
+    with pytest.raises(ValueError, match="equal length, got a 2, b 3"):
+        wf.write_columns_csv(path, {"a": np.zeros(2), "b": np.zeros(3)})
+    with pytest.raises(TypeError, match="must be an array of one axis"):
+        wf.write_columns_csv(path, {"a": np.zeros((2, 2))})
 
 
 def test_command(tmp_path: Path, ensemble: list[wf.Foam]) -> None:

@@ -371,7 +371,16 @@ def test_small_foams(foam: wf.Foam) -> None:
 
 
 @pytest.mark.parametrize(
-    "surface", [wf.Sphere(3.0), wf.Torus(4.0, 1.5), wf.FlatTorus(6.0, 5.0), wf.Ellipsoid(2.0, 1.5, 1.0)]
+    "surface",
+    [
+        wf.Sphere(3.0),
+        wf.Torus(4.0, 1.5),
+        wf.FlatTorus(6.0, 5.0),
+        wf.Ellipsoid(2.0, 1.5, 1.0),
+        wf.Cylinder(1.0, 6.0, periodic=True),
+        wf.SchwarzP(4.0),
+    ],
+    ids=lambda surface: type(surface).__name__,
 )
 @pytest.mark.parametrize("seed", [0, 1])
 def test_random_foams_keep_their_total_charge(surface: wf.Surface, seed: int) -> None:
