@@ -241,7 +241,11 @@ def test_command_for_readers(tmp_path: Path, ensemble: list[wf.Foam]) -> None:
     assert "clusters of charged bubbles" in done.output
     assert "120 bubbles, Euler characteristic 0" in done.output
     assert not (out / "defects.png").exists()
+    (out / "defects.png").write_text("of an earlier run")
     assert CliRunner().invoke(app, [*given, "--quiet"]).output == ""
+    assert not (out / "defects.png").exists()
+    taken = CliRunner().invoke(app, [*given[:2], "-o", str(tmp_path / "foam.npz")])
+    assert taken.exit_code == 2
     for bad in (["nowhere.npz"], [str(tmp_path / "foam.npz"), "--tiny", "7"]):
         assert CliRunner().invoke(app, ["defects", *bad]).exit_code == 2
 

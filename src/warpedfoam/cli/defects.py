@@ -24,6 +24,8 @@ def inspect_file(
 ) -> tuple[DefectReport, dict[str, Any]]:
     """Find the defects of the foam in ``file``, write tables, picture and record, and return the facts.
 
+    Without a picture, one of an earlier run is removed.
+
     Parameters
     ----------
     file : str
@@ -40,8 +42,6 @@ def inspect_file(
     ValueError, OSError
         If the file is no foam, a number is out of range, or the folder cannot be written.
     """
-    from warpedfoam.plot import plot_defects, save_figure
-
     foam = load(file)
     found = defects(foam, tiny=tiny)
     folder = Path(file).parent if out is None else Path(out)
@@ -53,10 +53,16 @@ def inspect_file(
     names = [f"{table}.csv" for table in TABLES] + ([PICTURE] if picture else [])
     paths = {name: writable_path(folder / name) for name in names}
     record = writable_path(folder / RECORD)
+    # the record is written last, so that a folder that has one holds the outputs of one run
+    record.unlink(missing_ok=True)
     for table in TABLES:
         write_columns_csv(paths[f"{table}.csv"], found.columns(table))
     if picture:
+        from warpedfoam.plot import plot_defects, save_figure
+
         save_figure(paths[PICTURE], plot_defects(foam, found))
+    else:
+        (folder / PICTURE).unlink(missing_ok=True)
     facts = {
         "file": file,
         **_facts(foam, found),
