@@ -9,6 +9,9 @@ import warpedfoam as wf
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.moves.t1 import rewire
 
+#: Rows and columns of the honeycombs that defects are planted in.
+SIZE = 12
+
 
 def loops_of_triangulation(n_nodes: int, triangles: np.ndarray) -> list[list[int]]:
     """Triangles round each node, counter-clockwise."""
@@ -199,3 +202,13 @@ def with_markers(foam: wf.Foam, films: np.ndarray) -> wf.Foam:
     middles = foam.film_curves_at(np.array([0.5]))[films, 0]
     points = np.vstack([foam.vertex_points, foam.cell.surface.project(middles)])
     return wf.Foam(foam.cell, wf.CellNetwork(following, origin, bubble), points)
+
+
+def node(i: int, j: int) -> int:
+    return int(at(i, j, SIZE, SIZE))
+
+
+def slip(steps: int, one: tuple[int, int] = (3, 4), two: tuple[int, int] = (2, 5)) -> wf.Foam:
+    """Shift ``steps`` bubbles of the upper row of a honeycomb by one spacing against the lower row."""
+    foam = honeycomb(SIZE, SIZE)
+    return glide(foam, bond(foam.network, node(*one), node(*two)), steps)
