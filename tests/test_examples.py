@@ -26,7 +26,7 @@ def example(name: str) -> ModuleType:
 
 def test_every_example_is_tested() -> None:
     assert {p.stem for p in EXAMPLES.glob("*.py")} == {
-        "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply",
+        "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply", "04_defects_on_tori",
     }  # fmt: skip
 
 
@@ -51,3 +51,14 @@ def test_export_ply(tmp_path: Path) -> None:
     assert share == pytest.approx(0.99961, abs=2e-4)
     names = {"foam.ply", "foam_view.ply", "foam.npz", "bubbles.csv", "films.csv"}
     assert {p.name for p in tmp_path.iterdir()} == names
+
+
+def test_defects_on_tori(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    outer, pull = example("04_defects_on_tori").main(3, 80, tmp_path)
+    # 12 in large foams; small ones have one or two less, and three of them scatter
+    assert outer == pytest.approx(11.0, abs=3.0)
+    assert pull < 8.0
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "charge_1.5.png", "charge_3.png", "charge_6.png", "defects.png",
+    }  # fmt: skip
+    assert len(capsys.readouterr().out.splitlines()) == 7

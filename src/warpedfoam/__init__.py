@@ -15,9 +15,22 @@ from warpedfoam import startup  # first, before anything slow
 # isort: split
 from warpedfoam import theory
 from warpedfoam.analysis import (
+    BondOrder,
+    ChargeEnergies,
+    ChargeProfile,
+    Correlations,
+    DefectReport,
     EquilibriumReport,
+    FoamStatistics,
     SideDistribution,
+    bond_order,
+    charge_energies,
+    charge_in,
+    charge_profile,
+    correlations,
+    defects,
     equilibrium_report,
+    foam_statistics,
     side_distribution,
 )
 from warpedfoam.cell import HeleShawCell
@@ -34,13 +47,24 @@ from warpedfoam.io import (
     load,
     save,
     write_bubbles_csv,
+    write_columns_csv,
     write_films_csv,
     write_ply,
     write_record,
 )
 from warpedfoam.moves import T1Event, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
-from warpedfoam.plot import plot_foam, save_picture
+from warpedfoam.plot import (
+    plot_charge_energies,
+    plot_charge_profile,
+    plot_correlations,
+    plot_defects,
+    plot_foam,
+    plot_order,
+    plot_sides,
+    save_figure,
+    save_picture,
+)
 from warpedfoam.relax import Relaxation, relax
 from warpedfoam.studies import GeodesicCircle, geodesic_circle
 from warpedfoam.surfaces import (
@@ -72,15 +96,21 @@ from warpedfoam.tessellate import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "BondOrder",
     "Catenoid",
     "CellNetwork",
+    "ChargeEnergies",
+    "ChargeProfile",
     "ConvergenceError",
+    "Correlations",
     "Cylinder",
+    "DefectReport",
     "Ellipsoid",
     "EquilibriumReport",
     "FileFormatError",
     "FlatTorus",
     "Foam",
+    "FoamStatistics",
     "GeodesicCircle",
     "GeodesicDistances",
     "Graph",
@@ -102,17 +132,31 @@ __all__ = [
     "Torus",
     "TriangleMesh",
     "WarpedFoamError",
+    "bond_order",
+    "charge_energies",
+    "charge_in",
+    "charge_profile",
+    "correlations",
+    "defects",
     "equilibrium_report",
+    "foam_statistics",
     "geodesic_circle",
     "geodesic_distances",
     "geodesic_report",
     "load",
     "mesh_report",
     "network_from_loops",
+    "plot_charge_energies",
+    "plot_charge_profile",
+    "plot_correlations",
+    "plot_defects",
     "plot_foam",
+    "plot_order",
+    "plot_sides",
     "read_mesh",
     "relax",
     "save",
+    "save_figure",
     "save_picture",
     "side_distribution",
     "t1",
@@ -120,6 +164,7 @@ __all__ = [
     "voronoi_foam",
     "wall_t1",
     "write_bubbles_csv",
+    "write_columns_csv",
     "write_films_csv",
     "write_ply",
     "write_record",

@@ -1,13 +1,42 @@
-"""Measurements on foams: sides and charges, equilibrium, the honeycomb bound."""
+"""Measurements on foams: sides and charges, defects, order, curvature, equilibrium, the honeycomb bound."""
 
+from warpedfoam.analysis.charge_curvature import (
+    ChargeEnergies,
+    ChargeProfile,
+    band_curvatures,
+    charge_energies,
+    charge_in,
+    charge_profile,
+)
+from warpedfoam.analysis.correlations import Correlations, correlations, excess_charges
+from warpedfoam.analysis.defect_report import KINDS, DefectReport
+from warpedfoam.analysis.defects import defects
 from warpedfoam.analysis.equilibrium import EquilibriumReport, equilibrium_report
 from warpedfoam.analysis.honeycomb import honeycomb_bound
+from warpedfoam.analysis.order import BondOrder, bond_order
 from warpedfoam.analysis.sides import SideDistribution, side_distribution
+from warpedfoam.analysis.statistics import FoamStatistics, foam_statistics
 
 __all__ = [
+    "KINDS",
+    "BondOrder",
+    "ChargeEnergies",
+    "ChargeProfile",
+    "Correlations",
+    "DefectReport",
     "EquilibriumReport",
+    "FoamStatistics",
     "SideDistribution",
+    "band_curvatures",
+    "bond_order",
+    "charge_energies",
+    "charge_in",
+    "charge_profile",
+    "correlations",
+    "defects",
     "equilibrium_report",
+    "excess_charges",
+    "foam_statistics",
     "honeycomb_bound",
     "side_distribution",
 ]

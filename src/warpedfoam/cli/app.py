@@ -237,6 +237,34 @@ def check(
         raise typer.Exit(NOT_CONVERGED)
 
 
+@app.command()
+def defects(
+    file: Annotated[str, typer.Argument(help="A saved foam: foam.npz.", metavar="FOAM.NPZ")],
+    out: Annotated[
+        str | None, typer.Option("-o", "--out", help="Folder for the results; the foam's own if left out.")
+    ] = None,
+    tiny: Annotated[
+        float, typer.Option("--tiny", help="Flag films shorter than this many bubble sizes.")
+    ] = 0.1,
+    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the defects.")] = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Find the defects of a foam: charges, dislocations, scars, pleats; tables and a picture."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.defects import inspect_file, summary_tables, summary_text
+
+        found, facts = inspect_file(file, out=out, tiny=tiny, picture=picture)
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            from rich.console import Console
+
+            Console(highlight=False).print(summary_tables(found, facts))
+            print(summary_text(facts), flush=True)
+
+
 def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
     foam = {name: given[name] for name in ("n_bubbles", "seeds", "cells", "lloyd")}

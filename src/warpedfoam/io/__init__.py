@@ -5,7 +5,7 @@ from warpedfoam.io.meshes import write_mesh
 from warpedfoam.io.ply import write_ply
 from warpedfoam.io.record import versions, write_record
 from warpedfoam.io.state import load, save
-from warpedfoam.io.tables import write_bubbles_csv, write_films_csv
+from warpedfoam.io.tables import write_bubbles_csv, write_columns_csv, write_films_csv
 
 __all__ = [
     "atomic_binary",
@@ -14,6 +14,7 @@ __all__ = [
     "save",
     "versions",
     "write_bubbles_csv",
+    "write_columns_csv",
     "write_films_csv",
     "write_mesh",
     "write_ply",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpedfoam.arrays import Floats, as_instance
 from warpedfoam.foam import Foam
@@ -100,6 +102,36 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
         "z": z.tolist(),
     }
     return _write(target, columns)
+
+
+def write_columns_csv(path: PathLike, columns: Mapping[str, NDArray[Any]]) -> Path:
+    """Write columns of equal length, such as `DefectReport.columns` gives, under their names.
+
+    Parameters
+    ----------
+    path : str or path
+    columns : mapping of str to (n,) array
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a column is no array of one axis, or columns differ in length.
+    FileNotFoundError, IsADirectoryError
+        If the path cannot be written.
+    """
+    target = writable_path(path)
+    for name, values in columns.items():
+        if not isinstance(values, np.ndarray) or values.ndim != 1:
+            raise TypeError(f"columns[{name!r}] must be an array of one axis")
+    if len({len(values) for values in columns.values()}) > 1:
+        sizes = ", ".join(f"{name} {len(values)}" for name, values in columns.items())
+        raise ValueError(f"columns must be of equal length, got {sizes}")
+    return _write(target, {name: values.tolist() for name, values in columns.items()})
 
 
 def _energy_shares(foam: Foam) -> Floats:

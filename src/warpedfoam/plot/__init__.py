@@ -1,7 +1,9 @@
 """Pictures; matplotlib is imported when the first one is drawn."""
 
 from warpedfoam.plot.charted import Charted
-from warpedfoam.plot.foam_picture import plot_foam, save_picture
+from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
+from warpedfoam.plot.defect_picture import plot_defects, plot_order
+from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
 from warpedfoam.plot.paper_figures import figure_curvature, figure_gap, figure_spheres, figure_torus_energy
 from warpedfoam.plot.surface_pictures import figure_circles, figure_surface
 
@@ -13,6 +15,13 @@ __all__ = [
     "figure_spheres",
     "figure_surface",
     "figure_torus_energy",
+    "plot_charge_energies",
+    "plot_charge_profile",
+    "plot_correlations",
+    "plot_defects",
     "plot_foam",
+    "plot_order",
+    "plot_sides",
+    "save_figure",
     "save_picture",
 ]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_integer, as_number
+from warpedfoam.arrays import Floats, Ints, as_integer, as_number
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, atomic_binary, writable_path
 from warpedfoam.io.colours import (
@@ -35,7 +36,7 @@ _MOST_VECTORS = 20_000
 PROPER = {"SchwarzP": "Schwarz P surface"}
 # Backs keep this share of their colour, the rest is this grey.
 BACK_SHARE, BACK_GREY = 0.25, 0.62
-_FORMATS = (".png", ".svg", ".pdf")
+FORMATS = (".png", ".svg", ".pdf")
 
 
 def plot_foam(
@@ -80,10 +81,51 @@ def plot_foam(
     -----
     O(n log n) in the number of triangles, about 70 per bubble for thousands of bubbles.
     """
+    colours = bubble_colours(foam, color_by)
+    figure, axes = painted_foam(foam, colours, view=view, size=size, title=title)
+    if colours.name in ("charge", "sides"):
+        counted_sides(figure, foam, colours)
+    else:
+        colour_bar(figure, axes, colours)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Lines of a picture beside the plain films.
+
+    Attributes
+    ----------
+    halves : (k,) integer array
+        Half-films drawn otherwise, in ``film_rgb`` (k, 3) and ``film_widths`` (k,) times their plain width.
+        Where a surface repeats, only the image of the film beside the half-film's bubble is.
+    marks : (m, 2, 3) array
+        Segments on the surface, each on a bubble ``mark_bubble`` (m,), in ``mark_rgb`` (m, 3) and
+        ``mark_widths`` (m,) times the films' plain width.
+    """
+
+    halves: Ints
+    film_rgb: Floats
+    film_widths: Floats
+    marks: Floats
+    mark_bubble: Ints
+    mark_rgb: Floats
+    mark_widths: Floats
+
+
+def painted_foam(
+    foam: Foam,
+    colours: BubbleColours,
+    *,
+    view: tuple[float, float] | None,
+    size: tuple[float, float],
+    title: str | None,
+    strokes: Strokes | None = None,
+) -> tuple[Figure, Axes]:
+    """Figure with the foam in these colours, and its axes; no legend yet."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    colours = bubble_colours(foam, color_by)
     width, height = _pair(size, "size")
     if min(width, height) < 1.0:
         raise ValueError(f"size must be at least 1 inch each way, got {width:g} by {height:g}")
@@ -93,20 +135,15 @@ def plot_foam(
     segments, rings = _resolution(foam.n_bubbles)
     patches = bubble_patches(foam, curve_points=segments + 1, rings=rings)
     elevation, azimuth = _default_view(foam, patches) if chosen is None else chosen
-    axes_of_view = View.from_angles(elevation, azimuth)
 
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.set_axis_off()
-    _paint(axes, foam, patches, colours, axes_of_view, segments)
-    if colours.name in ("charge", "sides"):
-        _legend(figure, foam, colours)
-    else:
-        _colour_bar(figure, axes, colours)
+    _paint(axes, foam, patches, colours, View.from_angles(elevation, azimuth), segments, strokes)
     axes.set_title(_heading(foam) if title is None else title, fontsize=13)
-    return figure
+    return figure, axes
 
 
 def save_picture(
@@ -143,11 +180,24 @@ def save_picture(
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
     """
+    writable_path(path, suffixes=FORMATS)
+    as_integer(dpi, "dpi", minimum=20, maximum=2400)
+    figure = plot_foam(foam, color_by, view=view, size=size, title=title)
+    return save_figure(path, figure, dpi=dpi)
+
+
+def save_figure(path: PathLike, figure: Figure, *, dpi: int = 160) -> Path:
+    """Write a figure as PNG, SVG or PDF, by the ending of ``path``; the same figure gives the same file.
+
+    Raises
+    ------
+    TypeError, ValueError, FileNotFoundError, IsADirectoryError
+        As `save_picture`.
+    """
     from matplotlib import rc_context
 
-    target = writable_path(path, suffixes=_FORMATS)
+    target = writable_path(path, suffixes=FORMATS)
     dots = as_integer(dpi, "dpi", minimum=20, maximum=2400)
-    figure = plot_foam(foam, color_by, view=view, size=size, title=title)
     kind = target.suffix.lower().removeprefix(".")
     # no dates and no random names: the same foam gives the same file
     metadata: dict[str, Any] = {} if kind == "png" else {"CreationDate" if kind == "pdf" else "Date": None}
@@ -178,7 +228,13 @@ def _default_view(foam: Foam, patches: Patches) -> tuple[float, float]:
 
 
 def _paint(
-    axes: Axes, foam: Foam, patches: Patches, colours: BubbleColours, view: View, segments: int
+    axes: Axes,
+    foam: Foam,
+    patches: Patches,
+    colours: BubbleColours,
+    view: View,
+    segments: int,
+    strokes: Strokes | None,
 ) -> None:
     """Triangles and film segments in one collection, farthest first."""
     from matplotlib.collections import PolyCollection
@@ -196,9 +252,14 @@ def _paint(
     fill *= shades(np.where(front[:, None], normals, -normals))[:, None]
 
     curves, film = foam.film_curves(segments + 1), np.arange(foam.network.n_films)
+    special = None if strokes is None else strokes.halves >> 1
     if foam.loop_shifts is not None:
         # a bubble that reaches over the edge of the unit is drawn whole, with its own images of its films
         film = foam.network.loops.halves >> 1
+        if strokes is not None:
+            place = np.empty(2 * foam.network.n_films, dtype=np.int64)
+            place[foam.network.loops.halves] = np.arange(len(film))
+            special = place[strokes.halves]
         curves = curves[film] + foam.loop_shifts[:, None]
     middles = 0.5 * (curves[:, 1:] + curves[:, :-1]).reshape(-1, 3)
     towards = view.project(surface.normals(middles))[:, 2] > 0.0
@@ -211,24 +272,41 @@ def _paint(
     np.maximum.at(span, patches.triangle_bubble[seen], np.ptp(corners[:, :, 2], axis=1))
     beside = np.maximum(span[foam.network.left], span[foam.network.right])[film]
     lift = np.repeat(beside, segments)[towards] + np.ptp(pieces[:, :, 2], axis=1)
+    thin = _film_width(foam.n_bubbles)
+    ink = np.tile(as_rgb(FILM_COLOUR) / 255.0, (len(film), 1))
+    widths = np.full(len(film), thin)
+    if strokes is not None and special is not None:
+        ink[special], widths[special] = strokes.film_rgb, thin * strokes.film_widths
+        # above plain films in the same place
+        over = np.zeros(len(film))
+        over[special] = beside[special]
+        lift += np.repeat(over, segments)[towards]
+    ink, widths = (np.repeat(a, segments, axis=0)[towards] for a in (ink, widths))
+    if strokes is not None and len(strokes.marks):
+        middle = strokes.marks.mean(axis=1)
+        shown = view.project(surface.normals(middle))[:, 2] > 0.0
+        marks = view.project(strokes.marks[shown])
+        pieces = np.concatenate([pieces, marks])
+        # over the bubble's films, which are lifted once
+        lift = np.concatenate([lift, 2.0 * span[strokes.mark_bubble[shown]] + np.ptp(marks[:, :, 2], axis=1)])
+        ink = np.concatenate([ink, strokes.mark_rgb[shown]])
+        widths = np.concatenate([widths, thin * strokes.mark_widths[shown]])
     closed = np.concatenate([pieces, pieces[:, :1]], axis=1)
 
     owner = patches.triangle_bubble[seen]
     below = np.where(np.isin(owner, patches.sunk), 2.0 * span[owner], 0.0)
     depth = np.concatenate([corners[:, :, 2].mean(axis=1) - below, pieces[:, :, 2].mean(axis=1) + lift])
     order = back_to_front(depth)
-    ink = as_rgb(FILM_COLOUR) / 255.0
-    n_fill, n_ink = len(corners), len(closed)
     paths = np.concatenate([corners[:, :, :2], closed[:, :, :2]])[order]
-    faces = np.concatenate([fill, np.tile(ink, (n_ink, 1))])[order]
+    faces = np.concatenate([fill, ink])[order]
     # a hairline of its own colour closes the seams between triangles
-    widths = np.concatenate([np.full(n_fill, 0.5), np.full(n_ink, _film_width(foam.n_bubbles))])[order]
+    lines = np.concatenate([np.full(len(corners), 0.5), widths])[order]
     axes.add_collection(
         PolyCollection(
             list(paths),
             facecolors=faces,
             edgecolors=faces,
-            linewidths=widths,
+            linewidths=lines,
             capstyle="round",
             joinstyle="round",
             rasterized=len(paths) > _MOST_VECTORS,
@@ -254,7 +332,12 @@ def _heading(foam: Foam) -> str:
     return f"{count} bubble{'' if count == 1 else 's'} on {article} {kind} · energy {foam.energy:.6g}"
 
 
-def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
+def counted_sides(
+    figure: Figure,
+    foam: Foam,
+    colours: BubbleColours,
+    loc: Literal["outside right center", "outside right upper"] = "outside right center",
+) -> None:
     """One entry per number of sides that occurs, with how many bubbles have it."""
     from matplotlib.patches import Patch
 
@@ -289,7 +372,7 @@ def _legend(figure: Figure, foam: Foam, colours: BubbleColours) -> None:
     figure.legend(
         handles=[Patch(facecolor=tuple(c), edgecolor="#555555", linewidth=0.6, label=t) for c, t in entries],
         title=title,
-        loc="outside right center",
+        loc=loc,
         frameon=False,
         fontsize=11,
         title_fontsize=11,
@@ -301,7 +384,8 @@ def _signed(charge: int) -> str:
     return "0" if charge == 0 else f"{'+' if charge > 0 else '−'}{abs(charge)}"
 
 
-def _colour_bar(figure: Figure, axes: Axes, colours: BubbleColours) -> None:
+def colour_bar(figure: Figure, axes: Axes, colours: BubbleColours) -> None:
+    """Colour bar of values on the ramp."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
