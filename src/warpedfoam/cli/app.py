@@ -196,6 +196,16 @@ _add_surface(
     {"radius": "Radius of the inner plate.", "height": "Period along the axis."},
 )
 _add_surface(
+    "open_cylinder",
+    "A foam between two coaxial cylinders that end in rims.",
+    {"radius": "Radius of the inner plate.", "height": "Height between the rims."},
+)
+_add_surface(
+    "catenoid",
+    "A foam between a catenoid with two rims and its parallel surface.",
+    {"neck_radius": "Radius of the neck.", "height": "Height between the rims."},
+)
+_add_surface(
     "flat_torus",
     "A foam between two flat plates, repeating in both directions.",
     {"width": "Period along x.", "height": "Period along y."},
@@ -207,7 +217,7 @@ _add_surface(
 )
 _add_surface(
     "mesh",
-    "A foam between the smooth surface through a closed mesh and its parallel surface.",
+    "A foam between the smooth surface through a mesh, closed or with rims, and its parallel surface.",
     {"file": "Triangle mesh: PLY, OBJ, STL, OFF, GLB."},
 )
 

@@ -17,6 +17,7 @@ from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
 from warpedfoam.surfaces import (
+    Catenoid,
     Cylinder,
     Ellipsoid,
     FlatTorus,
@@ -37,6 +38,8 @@ MAKERS: Mapping[str, Callable[..., Surface]] = {
     "sphere": Sphere,
     "ellipsoid": Ellipsoid,
     "cylinder": lambda radius, height: Cylinder(radius, height, periodic=True),
+    "open_cylinder": Cylinder,
+    "catenoid": Catenoid,
     "flat_torus": FlatTorus,
     "schwarz_p": SchwarzP,
     "mesh": lambda file: MeshSurface.from_file(file),

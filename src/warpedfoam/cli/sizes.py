@@ -9,6 +9,8 @@ SIZES: Mapping[str, Mapping[str, float | str]] = {
     "sphere": {"radius": 10.0},
     "ellipsoid": {"a": 10.0, "b": 12.0, "c": 15.0},
     "cylinder": {"radius": 6.0, "height": 40.0},
+    "open_cylinder": {"radius": 6.0, "height": 20.0},
+    "catenoid": {"neck_radius": 6.0, "height": 14.0},
     "flat_torus": {"width": 40.0, "height": 30.0},
     "schwarz_p": {"cell_length": 20.0},
     "mesh": {"file": ""},

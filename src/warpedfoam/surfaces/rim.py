@@ -141,7 +141,13 @@ class Rim:
                 if not (np.abs(move) > 1e-15 * span).any():
                     break
             u[here] = v
-        return self._loop[side], u
+        loop = self._loop[side]
+        # a spline that is not quite on the surface: the place whose landing is nearest, or points would creep
+        for _ in range(2):
+            away = points - self.at(loop, u)
+            tangent, _, speed = self.frame(loop, u)
+            u = u + np.einsum("ni,ni->n", away, tangent) / speed
+        return loop, u
 
     def frame(self, loop: Ints, u: Floats) -> tuple[Floats, Floats, Floats]:
         """Unit tangents T (n, 3), unit conormals n × T into the surface (n, 3), and speeds |x'| (n,)."""
