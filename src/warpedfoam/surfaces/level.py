@@ -195,6 +195,10 @@ class LevelSurface(ABC):
         _, shape = self._shape(self.project(points))
         return _mean_gauss(shape)[1]
 
+    def shape_operators(self, points: ArrayLike, *, project: bool = True) -> Floats:
+        """W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|; without ``project`` that of the level set through each point."""
+        return self._shape(self.project(points) if project else as_points(points, "points", minimum=0))[1]
+
     # --- the whole surface ------------------------------------------------------------------------
 
     @cached_property

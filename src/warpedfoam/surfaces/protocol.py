@@ -124,6 +124,10 @@ class Surface(Protocol):
         """G = k1 k2, (n,)."""
         ...
 
+    def shape_operators(self, points: ArrayLike, *, project: bool = True) -> Floats:
+        """W = dn as symmetric matrices (n, 3, 3) with W n = 0; ``project=False`` for points that lie on it."""
+        ...
+
     def curvature_range(self) -> tuple[float, float]:
         """Least and greatest principal curvature anywhere on the surface."""
         ...

@@ -110,6 +110,11 @@ class Sphere:
         """1/r² at each point."""
         return np.full(len(as_points(points, "points", minimum=0)), self.radius**-2)
 
+    def shape_operators(self, points: ArrayLike, *, project: bool = True) -> Floats:  # noqa: ARG002
+        """(I − nnᵀ)/r."""
+        n = self.normals(points)
+        return (np.eye(3) - n[:, :, None] * n[:, None]) / self.radius
+
     def curvature_range(self) -> tuple[float, float]:
         """(1/r, 1/r)."""
         return 1.0 / self.radius, 1.0 / self.radius

@@ -147,6 +147,13 @@ class Torus:
         out: Floats = self.principal_curvatures(points).prod(axis=1)
         return out
 
+    def shape_operators(self, points: ArrayLike, *, project: bool = True) -> Floats:  # noqa: ARG002
+        """k1 e_φ e_φᵀ + k2 e_θ e_θᵀ."""
+        x = as_points(points, "points", minimum=0)
+        curvatures, frames = self.principal_curvatures(x), self.vertex_frames(x)
+        out: Floats = np.einsum("ni,nix,niy->nxy", curvatures, frames, frames)
+        return out
+
     def curvature_range(self) -> tuple[float, float]:
         """From −1/(R − r) on the inner equator to 1/r round the tube."""
         return -1.0 / (self.major_radius - self.minor_radius), 1.0 / self.minor_radius

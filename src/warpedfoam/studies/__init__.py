@@ -1,0 +1,1 @@
+"""Studies of few bubbles: one bubble between its plates, the potential that curvature makes."""
