@@ -39,8 +39,16 @@ from warpedfoam.io import (
 )
 from warpedfoam.moves import T1Event, t1
 from warpedfoam.network import CellNetwork, network_from_loops
-from warpedfoam.plot import plot_foam, save_picture
+from warpedfoam.plot import plot_foam, plot_potential, save_picture
 from warpedfoam.relax import Relaxation, relax
+from warpedfoam.studies import (
+    BubbleBetweenPlates,
+    GeometricPotential,
+    bubble_between_plates,
+    drift_path,
+    geometric_potential,
+    write_potential_csv,
+)
 from warpedfoam.surfaces import (
     Cylinder,
     Ellipsoid,
@@ -69,6 +77,7 @@ from warpedfoam.tessellate import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "BubbleBetweenPlates",
     "CellNetwork",
     "ConvergenceError",
     "Cylinder",
@@ -78,6 +87,7 @@ __all__ = [
     "FlatTorus",
     "Foam",
     "GeodesicDistances",
+    "GeometricPotential",
     "Graph",
     "HeatGeodesics",
     "HeleShawCell",
@@ -97,13 +107,17 @@ __all__ = [
     "Torus",
     "TriangleMesh",
     "WarpedFoamError",
+    "bubble_between_plates",
+    "drift_path",
     "equilibrium_report",
     "geodesic_distances",
     "geodesic_report",
+    "geometric_potential",
     "load",
     "mesh_report",
     "network_from_loops",
     "plot_foam",
+    "plot_potential",
     "read_mesh",
     "relax",
     "save",
@@ -114,5 +128,6 @@ __all__ = [
     "write_bubbles_csv",
     "write_films_csv",
     "write_ply",
+    "write_potential_csv",
     "write_record",
 ]

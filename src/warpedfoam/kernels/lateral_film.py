@@ -1,15 +1,15 @@
 """The lateral film of one bubble between two plates: area, volume moments and their derivatives.
 
 The bubble is the image of a box, X(λ, φ, t): t runs from the inner plate to the outer one, φ once round,
-and λ from the bubble's axis to its film at λ = 1. X is known at nodes, in between it is a polynomial in λ and t
-(Gauss–Lobatto nodes) and a trigonometric one in φ (an odd number of even nodes: with an even number the film
-would not feel a zigzag). Then
+and λ from the bubble's axis to its film at λ = 1. X is known at nodes, in between it is a polynomial in λ
+and t (Gauss–Lobatto nodes) and a trigonometric one in φ (an odd number of even nodes: with an even number the
+film would not feel a zigzag). Then
 
 - film area  A = ∫∫ |X_φ × X_t| dφ dt at λ = 1;
 - moments    M_c = ∫∫∫ c(X) X_λ · (X_φ × X_t) dλ dφ dt; c = 1 gives the volume.
 
-Node (k, j) of the film moves along one line only, its radius ρ_kj, and takes the nodes inside with it. Values and
-gradients are exact derivatives of the discrete sums and need no more than dX/dρ. Hessians use the boundary's
+Node (k, j) of the film moves along one line only, its radius ρ_kj, and takes the nodes inside with it.
+Gradients are exact derivatives of the discrete sums and need no more than dX/dρ. Hessians use the boundary's
 second variation, which differs from that of the sums by quadrature error, and of d²X only the part along the
 plates' normal: forces tangent to the plates vanish at equilibrium.
 
@@ -156,7 +156,8 @@ def _to_nodes(grid: FilmGrid, by_around: Floats, by_up: Floats) -> Floats:
 
 def region_points(grid: FilmGrid, points: Floats) -> Floats:
     """The Gauss points (I, G, m, 3) at which moments want their densities."""
-    return np.einsum("gk,ikjx->igjx", grid.rise, points)
+    out: Floats = np.einsum("gk,ikjx->igjx", grid.rise, points)
+    return out
 
 
 def region_moments(
@@ -195,8 +196,8 @@ def film_hessian(
 ) -> Floats:
     """Second derivatives of A − ∫ c dV by the radii of all curves, (L m, L m).
 
-    ``points``, ``moves`` = dX/dρ, ``normals`` (L, m, 3) and ``bends`` = n · d²X/dρ² (L, m) belong to the film's
-    nodes; ``density`` c (G, m) and its gradient ``slope`` (G, m, 3) to its Gauss points.
+    ``points``, ``moves`` = dX/dρ, ``normals`` (L, m, 3) and ``bends`` = n · d²X/dρ² (L, m) belong to the
+    film's nodes; ``density`` c (G, m) and its gradient ``slope`` (G, m, 3) to its Gauss points.
     """
     n_heights, (n_layers, n_angles, _) = len(grid.rise), points.shape
     around, up, normal, size = _slopes(grid, points)

@@ -1,4 +1,4 @@
-"""Where the nodes of one bubble lie: rays from its place, brought down to the surface, lifted through the gap."""
+"""Where the nodes of one bubble lie: rays from its place, brought down to the surface, lifted off it."""
 
 from __future__ import annotations
 
@@ -121,8 +121,8 @@ Coordinates = Callable[[Floats], tuple[Floats, Floats]]
 def angle_coordinates(chart: Chart) -> Coordinates | None:
     """Lengths that go with the angles of a torus or a cylinder; None for surfaces without angles.
 
-    On a torus r (φ − φ0) and the ring's angle times R + r cos φ0, along e1 and e2; on a cylinder the angle times
-    its radius, and the height. Their mean over a bubble vanishes where its mean angles are those of q.
+    On a torus r (φ − φ0) and the ring's angle times R + r cos φ0, along e1 and e2; on a cylinder the angle
+    times its radius, and the height. Their mean over a bubble vanishes where its mean angles are those of q.
     """
     surface, origin, frame = chart.surface, chart.origin, chart.frame
     if isinstance(surface, Torus):

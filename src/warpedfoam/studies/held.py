@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -107,16 +107,20 @@ class State:
 class Solved:
     """Where Newton's method ended.
 
-    ``multipliers`` of volume and coordinates; ``residual`` in units of γ d; ``fault``, the largest relative error
-    of a constraint; ``stiffness``, the least eigenvalue of the Hessian on changes that keep the constraints.
+    ``multipliers`` of volume and coordinates; ``residual`` in units of γ d; ``fault``, the largest relative
+    error of a constraint.
     """
 
     state: State
     multipliers: Floats
     residual: float
     fault: float
-    stiffness: float
     iterations: int
+
+    @property
+    def worst(self) -> float:
+        """The larger of residual and fault."""
+        return max(self.residual, self.fault)
 
 
 def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
@@ -130,16 +134,18 @@ def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
     for iteration in range(MOST_STEPS):
         state = held.state(radii)
         pull = state.gradient - multipliers @ state.slants
-        residual = float(np.abs(pull).max()) / held.grid.heights[-1]
         missing = target - state.moments
-        fault = float(np.abs(missing / scale).max())
-        reached = Solved(state, multipliers, residual, fault, np.nan, iteration)
-        if best is None or max(residual, fault) < max(best.residual, best.fault):
-            stale = 0 if best is None or max(residual, fault) < 0.5 * max(best.residual, best.fault) else stale + 1
+        reached = Solved(
+            state,
+            multipliers,
+            float(np.abs(pull).max()) / held.grid.heights[-1],
+            float(np.abs(missing / scale).max()),
+            iteration,
+        )
+        stale = 0 if best is None or reached.worst < 0.5 * best.worst else stale + 1
+        if best is None or reached.worst < best.worst:
             best = reached
-        else:
-            stale += 1
-        if max(residual, fault) <= TIGHT or (stale >= 2 and max(best.residual, best.fault) <= TOLERANCE):
+        if best.worst <= TIGHT or (stale >= 2 and best.worst <= TOLERANCE):
             break
         hessian = held.hessian(state, multipliers)
         n = len(pull)
@@ -153,10 +159,11 @@ def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
         radii = radii + share * step[:n].reshape(radii.shape)
         multipliers = multipliers + share * step[n:]
     assert best is not None
-    return replace(best, stiffness=_stiffness(held.hessian(best.state, best.multipliers), best.state.slants))
+    return best
 
 
-def _stiffness(hessian: Floats, slants: Floats) -> float:
-    """Least eigenvalue on the null space of the constraints."""
+def stiffness(held: HeldBubble, solved: Solved) -> float:
+    """Least eigenvalue of the Hessian on changes that keep the constraints."""
+    slants = solved.state.slants
     basis = np.linalg.qr(slants.T, mode="complete")[0][:, len(slants) :]
-    return float(np.linalg.eigvalsh(basis.T @ hessian @ basis)[0])
+    return float(np.linalg.eigvalsh(basis.T @ held.hessian(solved.state, solved.multipliers) @ basis)[0])
