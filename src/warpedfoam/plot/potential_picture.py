@@ -96,7 +96,7 @@ def plot_potential(
     bar = figure.colorbar(ScalarMappable(norm, ramp), ax=axes, shrink=0.75)
     # differences of E/E0 lie far behind the point: the ticks carry them, not an offset over the bar
     bar.set_ticks(np.linspace(low, high, 5).tolist())
-    digits = int(np.clip(np.ceil(-np.log10(high - low)) + 2, 2, 12))
+    digits = int(np.clip(np.ceil(-np.log10(high - low)) + 3, 2, 13))
     bar.set_ticklabels([f"{v:.{digits}f}" for v in np.linspace(low, high, 5)])
     bar.set_label("E / E0")
     heading = f"V = {one.volume:g}, d = {one.cell.gap:g}, {one.method}"

@@ -306,21 +306,22 @@ def _message(task: _Task, met: bool, minimum: bool) -> str:
     return "at rest"
 
 
-#: Steps of a free bubble; force in units of γ d at which it rests; step of differences, in radii.
-FREE_STEPS, REST, DIFFERENCE = 60, 1e-9, 1e-2
+#: Steps of a free bubble; force in units of γ d at which it rests; step of differences, in radii; stiffness
+#: of its place, in units of γ d per radius, that counts as none.
+FREE_STEPS, REST, DIFFERENCE, FLAT = 60, 1e-9, 1e-2, 1e-9
 
 
 def _at_rest(task: _Task, point: Floats) -> BubbleBetweenPlates:
     """Follow the force of a held bubble to a place without force: Newton's method in two dimensions."""
     surface, gap, h = task.cell.surface, task.cell.gap, DIFFERENCE * task.radius
     bubble = _held(task, point)
-    longest = max(0.5 * task.radius, 0.25 / max(map(abs, surface.curvature_range())))
+    longest = max(0.5 * task.radius, 0.25 / max(1e-60, *map(abs, surface.curvature_range())))
     values = np.zeros(2)
     for _ in range(FREE_STEPS):
+        if not bubble.converged:
+            break
         frame = surface.vertex_frames(bubble.position[None])[0]
         pull = frame @ bubble.force
-        if np.abs(pull).max() <= REST * gap or not bubble.converged:
-            break
         columns = []
         for step in h * np.eye(2):
             ahead, behind = (
@@ -329,12 +330,14 @@ def _at_rest(task: _Task, point: Floats) -> BubbleBetweenPlates:
             columns.append(frame @ (behind.force - ahead.force) / (2.0 * h))
         bend = np.stack(columns, axis=1)
         values, vectors = np.linalg.eigh(0.5 * (bend + bend.T))
-        along = vectors.T @ pull / np.maximum(np.abs(values), 1e-9)
+        if np.abs(pull).max() <= REST * gap:
+            break
+        along = vectors.T @ pull / np.maximum(np.abs(values), FLAT * gap / task.radius)
         move = vectors @ along
         move *= min(1.0, longest / float(np.linalg.norm(move)))
         for _ in range(8):
             there = _held(task, surface.retract(bubble.position[None], move[None])[0])
-            if there.energy <= bubble.energy + 1e-13 * abs(bubble.energy):
+            if there.energy <= bubble.energy * (1.0 + 1e-13):
                 break
             move = 0.5 * move
         else:
@@ -345,7 +348,7 @@ def _at_rest(task: _Task, point: Floats) -> BubbleBetweenPlates:
 
 def _settled(bubble: BubbleBetweenPlates, values: Floats, gap: float) -> BubbleBetweenPlates:
     rests = float(np.abs(bubble.force).max()) <= REST * gap
-    lowest = bool(values.min() >= -1e-7)
+    lowest = bool(values.min() >= -FLAT * gap / bubble.flat_radius)
     message = bubble.message
     if bubble.converged and not rests:
         message = "still drifting: start nearer to a place of rest"
