@@ -40,7 +40,7 @@ from warpedfoam.io import (
 from warpedfoam.moves import T1Event, t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import plot_foam, plot_potential, save_picture
-from warpedfoam.relax import Relaxation, relax
+from warpedfoam.relax import LayeredRelaxation, Relaxation, relax
 from warpedfoam.studies import (
     BubbleBetweenPlates,
     GeometricPotential,
@@ -92,6 +92,7 @@ __all__ = [
     "HeatGeodesics",
     "HeleShawCell",
     "Implicit",
+    "LayeredRelaxation",
     "LevelSurface",
     "MeshError",
     "MeshSurface",
