@@ -71,9 +71,12 @@ def test_torus(degrees: float, free: float, ruled: float) -> None:
     assert ratio(flat) == pytest.approx(ruled, abs=6e-10)
 
 
-@pytest.mark.parametrize(("radius", "volume", "gap"), [(10.0, 0.3, 0.5), (26.0, 0.7, 0.5), (2.0, 0.9, 0.3)])
+@pytest.mark.parametrize(
+    ("radius", "volume", "gap"),
+    [(10.0, 0.3, 0.5), (26.0, 0.7, 0.5), (2.0, 0.9, 0.3), (1.0, 0.2, 0.1), (1.0, 0.15, 0.05)],
+)
 def test_ruled_films_on_spheres_are_cones(radius: float, volume: float, gap: float) -> None:
-    """E = π r² σ2 sqrt(1 − (1 − 3V/2πσ3r³)²) with σ_n = (1 + d/r)^n − 1."""
+    """E = π r² σ2 sqrt(1 − (1 − 3V/2πσ3r³)²) with σ_n = (1 + d/r)^n − 1; the last reaches down to 57°."""
     sigma2, sigma3 = (1.0 + gap / radius) ** 2 - 1.0, (1.0 + gap / radius) ** 3 - 1.0
     cos = 1.0 - 3.0 * volume / (2.0 * np.pi * sigma3 * radius**3)
     bubble = on_sphere(radius, volume, gap, layers=1)

@@ -15,6 +15,8 @@ from warpedfoam.studies.held import TOLERANCE, HeldBubble, Solved, solve, stiffn
 
 #: Numbers of angles tried in turn, and the truncation that is good enough.
 ANGLES, RESOLVED = (17, 25, 37, 55), 1e-9
+#: Truncation from which a result says so.
+ROUGH = 1e-4
 #: Radial nodes: this many, and one more for so many angles more.
 RADIAL, ANGLES_A_RADIAL = 8, 6
 #: Ways to hold a bubble.
@@ -239,7 +241,7 @@ def _held(task: _Task, point: Floats) -> BubbleBetweenPlates:
             raise task.too_large(point) from None
         radii, multipliers = solved.state.radii, solved.multipliers
         left = truncation(grid, radii, solved.state.nodes.points)
-        if left <= RESOLVED or max(solved.residual, solved.fault) > TOLERANCE:
+        if left <= RESOLVED or solved.worst > TOLERANCE:
             break
     assert solved is not None
     return _report(task, held, solved, left, force_turns=angular is None)
@@ -266,7 +268,7 @@ def _report(
         shape = task.cell.surface.shape_operators(chart.origin[None], project=False)[0]
         lever = float(away @ chart.frame[2]) * (chart.frame[:2] @ shape @ chart.frame[:2].T)
         slope = slope + lever @ slope
-    met = max(solved.residual, solved.fault) <= TOLERANCE
+    met = solved.worst <= TOLERANCE
     softest = stiffness(held, solved)
     minimum = softest > 0.0
     return BubbleBetweenPlates(
@@ -289,7 +291,8 @@ def _report(
         is_minimum=minimum,
         converged=met and minimum,
         iterations=solved.iterations,
-        message=_message(task, met, minimum),
+        message=_message(task, met, minimum)
+        + (f", but {len(grid.angles)} angles resolve it only to {left:.1g}" if left > ROUGH else ""),
     )
 
 

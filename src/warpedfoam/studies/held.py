@@ -14,10 +14,12 @@ from warpedfoam.kernels.lateral_film import (
     region_moments,
     region_points,
 )
-from warpedfoam.studies.chart import Chart, Coordinates, Nodes
+from warpedfoam.studies.chart import Chart, Coordinates, Nodes, OutOfChart
 
 #: Newton steps, and the largest change of a radius in one of them, in mean radii.
 MOST_STEPS, LONGEST = 40, 0.25
+#: Least share of a step that is tried where the whole of it leads off the surface.
+LEAST_SHARE = 0.05
 #: Force in units of γ d and relative errors of the constraints at which the method stops.
 TIGHT = 1e-12
 #: A run that stops improving counts if it came as far as this.
@@ -131,8 +133,8 @@ def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
     target = np.array([held.volume, 0.0, 0.0])
     best: Solved | None = None
     stale = 0
+    state, _ = _within(held, 0.5 * radii, 0.5 * radii)
     for iteration in range(MOST_STEPS):
-        state = held.state(radii)
         pull = state.gradient - multipliers @ state.slants
         missing = target - state.moments
         reached = Solved(
@@ -156,10 +158,22 @@ def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
         step = np.linalg.solve(matrix, np.concatenate([-pull, -missing]))
         longest = float(np.abs(step[:n]).max())
         share = min(1.0, LONGEST * size / longest) if longest > 0.0 else 1.0
-        radii = radii + share * step[:n].reshape(radii.shape)
-        multipliers = multipliers + share * step[n:]
+        state, kept = _within(held, state.radii, share * step[:n].reshape(radii.shape))
+        multipliers = multipliers + kept * share * step[n:]
     assert best is not None
     return best
+
+
+def _within(held: HeldBubble, radii: Floats, change: Floats) -> tuple[State, float]:
+    """The state after a change, or after the first half, quarter … of it that has a place on the surface."""
+    share = 1.0
+    while True:
+        try:
+            return held.state(radii + share * change), share
+        except OutOfChart:
+            share *= 0.5
+            if share < LEAST_SHARE:
+                raise
 
 
 def stiffness(held: HeldBubble, solved: Solved) -> float:
