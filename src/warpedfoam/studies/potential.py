@@ -231,7 +231,8 @@ def drift_path(
 ) -> GeometricPotential:
     """Path of steepest descent of the potential, along which a bubble with friction drifts.
 
-    Midpoint steps along F/|F|, halved where the energy would rise, until they are 2⁻¹⁰ of the first.
+    Midpoint steps along F/|F|, halved where the energy would rise or the force turn back, until they are 2⁻¹⁰
+    of the first.
 
     Parameters
     ----------
@@ -292,7 +293,9 @@ def drift_path(
         middle = at(moved(here.points, here.forces, 0.5 * size))
         pull = middle.forces if np.linalg.norm(middle.forces) > 0.0 else here.forces
         there = at(moved(here.points, pull, size))
-        if there.energies[0] < here.energies[0]:
+        # neither uphill nor past the bottom
+        ahead = float((there.forces * (there.points - here.points)).sum())
+        if there.energies[0] < here.energies[0] and ahead >= 0.0:
             trail.append(there)
             travelled.append(travelled[-1] + size)
             here = there
