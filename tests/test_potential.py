@@ -176,3 +176,18 @@ def test_pictures(model: wf.GeometricPotential) -> None:
     wide = wf.geometric_potential(wf.HeleShawCell(TORUS, 1.3), 0.5, points=PATH[:1], layers=2)
     with pytest.raises(ValueError, match="no energy to draw"):
         wf.plot_potential(wide)
+
+
+def test_the_page_on_films_runs() -> None:
+    """docs/films_in_3d.md: its Python does what its text says."""
+    text = (Path(__file__).parents[1] / "docs" / "films_in_3d.md").read_text(encoding="utf-8")
+    space: dict[str, object] = {"__name__": "__main__"}
+    for block in text.split("```python\n")[1:]:
+        exec(compile(block.split("```")[0], "films_in_3d.md", "exec"), space)
+    bubble, free, ruled = space["bubble"], space["free"], space["ruled"]
+    assert isinstance(bubble, wf.BubbleBetweenPlates)
+    assert bubble.message == "at rest"
+    assert bubble.energy / bubble.flat_energy == pytest.approx(1.0000191, abs=5e-8)
+    assert isinstance(free, wf.GeometricPotential)
+    assert isinstance(ruled, wf.GeometricPotential)
+    assert (free.energies < ruled.energies).all()
