@@ -121,6 +121,24 @@ def test_fifty_bubbles(
     assert result.film_points.shape == (5, result.foam.network.n_films, 5, 3)
 
 
+def test_pressures_are_slopes_in_volume(ruled: dict[str, wf.Relaxation]) -> None:
+    """Gas moved from one bubble to another costs the difference of their pressures."""
+    foam = ruled["torus"].foam.with_order(8)
+    one = wf.relax(foam, layers=3)
+    give, take, share = int(np.argmax(one.pressures)), int(np.argmin(one.pressures)), 2e-3
+    energies = []
+    for sign in (1.0, -1.0):
+        targets = foam.target_volumes.copy()
+        targets[take] += sign * share
+        targets[give] -= sign * share
+        other = wf.Foam(foam.cell, foam.network, foam.vertex_points, foam.film_offsets, targets)
+        result = wf.relax(other, layers=3, t1=False)
+        assert result.converged
+        energies.append(result.energy)
+    slope = (energies[0] - energies[1]) / (2.0 * share)
+    assert slope == pytest.approx(one.pressures[take] - one.pressures[give], rel=1e-4)
+
+
 def test_contact_at_right_angles_comes_out(ruled: dict[str, wf.Relaxation]) -> None:
     """On the sphere the error at the plates falls with the order of the films."""
     foam = ruled["sphere"].foam
