@@ -104,6 +104,18 @@ def test_the_foam_of_the_how_to(surfaces: dict[str, Any]) -> None:
     assert surfaces["charges"][surfaces["waist"]].sum() < 0
 
 
+def test_the_theory_page() -> None:
+    space = run(ROOT / "docs" / "theory.md")
+    films = [0.999517699, 1.000019111, 1.000791843]  # as printed on the page
+    v, d = space["volume"], space["gap"]
+    k1, k2 = wf.theory.torus_curvatures(np.radians([0.0, 90.0, 180.0]), 20.0, 4.0)
+    np.testing.assert_allclose(wf.theory.second_order_ratio(v, d, k1, k2), films, atol=2e-6)
+    assert np.abs(wf.theory.fitted_ratio(1.0, v, d, k1 * k2) - films).max() > 1e-5
+    assert space["measured"].perimeter == pytest.approx(
+        space["traced"].perimeter, abs=space["measured"].error
+    )
+
+
 def test_the_table_has_every_surface() -> None:
     text = (ROOT / "docs" / "surfaces.md").read_text(encoding="utf-8")
     for name in wf.__all__:

@@ -59,6 +59,18 @@ def test_a_model_has_the_gradient_of_its_curvature(model: wf.GeometricPotential)
     assert model.method == "cylinder_model"
 
 
+def test_theory_beside_films(tmp_path: Path) -> None:
+    """To second order in the curvatures: within 2e-6 in E/E0 and a hundredth of the force on this torus."""
+    films = wf.geometric_potential(CELL, 0.5, path=PATH)
+    theory = wf.geometric_potential(CELL, 0.5, path=PATH, method="theory")
+    assert (theory.method, theory.layers) == ("theory", 0)
+    np.testing.assert_allclose(theory.ratios, films.ratios, atol=2e-6)
+    assert np.abs(theory.ratios - films.ratios).max() > 1e-7
+    strongest = np.linalg.norm(films.forces, axis=1).max()
+    np.testing.assert_allclose(theory.forces, films.forces, atol=0.01 * strongest)
+    assert wf.write_potential_csv(tmp_path / "both.csv", films, theory).exists()
+
+
 def test_lengths_along_a_path() -> None:
     fine = TORUS.points(np.linspace(0.0, np.pi, 400), np.zeros(400))
     out = wf.geometric_potential(CELL, 0.5, path=fine, method=cylinder_model)

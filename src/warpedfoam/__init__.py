@@ -13,6 +13,7 @@ A foam one bubble thick sits between two parallel curved plates a small gap apar
 from warpedfoam import startup  # first, before anything slow
 
 # isort: split
+from warpedfoam import theory
 from warpedfoam.analysis import (
     EquilibriumReport,
     SideDistribution,
@@ -43,9 +44,11 @@ from warpedfoam.plot import plot_foam, plot_potential, save_picture
 from warpedfoam.relax import LayeredRelaxation, Relaxation, relax
 from warpedfoam.studies import (
     BubbleBetweenPlates,
+    GeodesicCircle,
     GeometricPotential,
     bubble_between_plates,
     drift_path,
+    geodesic_circle,
     geometric_potential,
     write_potential_csv,
 )
@@ -86,6 +89,7 @@ __all__ = [
     "FileFormatError",
     "FlatTorus",
     "Foam",
+    "GeodesicCircle",
     "GeodesicDistances",
     "GeometricPotential",
     "Graph",
@@ -111,6 +115,7 @@ __all__ = [
     "bubble_between_plates",
     "drift_path",
     "equilibrium_report",
+    "geodesic_circle",
     "geodesic_distances",
     "geodesic_report",
     "geometric_potential",
@@ -125,6 +130,7 @@ __all__ = [
     "save_picture",
     "side_distribution",
     "t1",
+    "theory",
     "voronoi_foam",
     "write_bubbles_csv",
     "write_films_csv",

@@ -26,10 +26,11 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ConvergenceError
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 from warpedfoam.studies.bubble import BubbleBetweenPlates, bubble_between_plates
+from warpedfoam.theory import second_order_energy
 
 #: E of (volume, gap, k1, k2), the last two arrays of principal curvatures of the inner plate.
 Model = Callable[[float, float, Floats, Floats], Floats]
-FILMS = ("free", "ruled")
+FILMS, THEORY = ("free", "ruled"), "theory"
 #: Step of the differences that give a model's force, in flat radii.
 DIFFERENCE = 0.05
 
@@ -43,7 +44,7 @@ class GeometricPotential:
     cell : HeleShawCell
     volume : float
     method : str
-        "free" or "ruled" for relaxed films, else the name of the model.
+        "free" or "ruled" for relaxed films, "theory", or the name of the model.
     layers : int
         Layers of the films; 0 for a model.
     points : (n, 3) array
@@ -109,10 +110,11 @@ def geometric_potential(
         of the whole surface.
     path : (n, 3) array, optional
         Instead, places one after the other; the result has the distances along them.
-    method : {"free", "ruled"} or callable, optional
+    method : {"free", "ruled", "theory"} or callable, optional
         "free": films in full three dimensions, `bubble_between_plates`, about 0.1 s a place. "ruled": films
-        along the plate's normals. A callable gives E from (volume, gap, k1, k2), the last two the inner
-        plate's principal curvatures, (n,) each: a moment for any surface.
+        along the plate's normals. "theory": `warpedfoam.theory.second_order_energy`, a moment for any
+        surface. Any other callable that gives E from (volume, gap, k1, k2), the last two the inner plate's
+        principal curvatures, (n,) each, will do as well.
     layers, hold : optional
         See `bubble_between_plates`; "free" is no choice here. A model has neither.
     nodes : int, optional
@@ -166,13 +168,14 @@ def geometric_potential(
 def _evaluate(
     cell: HeleShawCell, volume: float, places: Floats, method: str | Model, layers: int, hold: str
 ) -> GeometricPotential:
-    if callable(method):
-        energies, forces = _of_model(cell, volume, places, method)
-        name = getattr(method, "__name__", type(method).__name__)
+    if method == THEORY or callable(method):
+        model: Model = method if callable(method) else second_order_energy
+        energies, forces = _of_model(cell, volume, places, model)
+        name = getattr(method, "__name__", type(method).__name__) if callable(method) else THEORY
         ones, nan = np.ones(len(places), dtype=bool), np.full(len(places), np.nan)
         shared = (frozen(places), frozen(energies), frozen(forces), frozen(nan), frozen(ones))
         return GeometricPotential(cell, volume, name, 0, *shared, triangles=None, lengths=None)
-    kind = as_choice(method, "method", FILMS)
+    kind = as_choice(method, "method", (*FILMS, THEORY))
     count = 1 if kind == "ruled" else as_integer(layers, "layers", minimum=2, maximum=12)
     how = as_choice(hold, "hold", ("centroid", "projection"))
     bubbles = [bubble_between_plates(cell, volume, q, layers=count, hold=how) for q in places]

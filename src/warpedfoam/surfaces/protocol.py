@@ -125,7 +125,7 @@ class Surface(Protocol):
         ...
 
     def shape_operators(self, points: ArrayLike, *, project: bool = True) -> Floats:
-        """W = dn, symmetric (n, 3, 3) with W n = 0; ``project=False`` for points that lie on it."""
+        """W = dn as symmetric matrices (n, 3, 3), W n = 0; ``project=False`` for points that lie on it."""
         ...
 
     def curvature_range(self) -> tuple[float, float]:
