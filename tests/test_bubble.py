@@ -212,6 +212,17 @@ def test_second_order_theory(case: str) -> None:
     assert left[0] < 2e-5
 
 
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4])
+def test_thin_gaps(gap: float) -> None:
+    """Round-off through the gap does not keep a bubble from its rest; theory holds there too."""
+    bubble = wf.bubble_between_plates(
+        wf.HeleShawCell(TORUS, gap), np.pi * 0.56**2 * gap, on_torus(0.0), layers=2
+    )
+    assert bubble.converged
+    k = TORUS.principal_curvatures(bubble.position[None])[0]
+    assert ratio(bubble) == pytest.approx(second_order(k, bubble.volume, gap), abs=2e-6)
+
+
 # --- derivatives ------------------------------------------------------------------------------------
 
 

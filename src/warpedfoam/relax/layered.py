@@ -24,6 +24,8 @@ from warpedfoam.surfaces.protocol import Layer
 MOST_STEPS, LONGEST, PATIENCE = 40, 0.1, 4
 #: Softness of the volumes in the matrix whose inertia is read, in units of |J|²/|H|.
 SOFT = 1e-4
+#: Residual that counts as round-off of places through a thin gap, in ε size ℓ / d².
+ROUNDING = 4.0
 #: Gauss points on the rays of the fans that give volumes: bubbles of a few dozen on a surface are large.
 RAYS = 12
 
@@ -252,7 +254,7 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
     layers : int
         2 or more.
     tolerance : float
-        Of the residual, in γ d.
+        Of the residual, in γ d; round-off in very thin gaps, where that is more.
 
     Raises
     ------
@@ -262,7 +264,9 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
     foam = ruled.foam
     system = LayeredSystem(foam, layers)
     state = system.start()
-    unit = foam.tension * foam.cell.gap
+    unit, gap = foam.tension * foam.cell.gap, foam.cell.gap
+    noise = ROUNDING * float(np.finfo(float).eps) * foam.cell.surface.size * foam.bubble_size / gap**2
+    tolerance = max(tolerance, noise)
     least, stale, iterations, fatal = np.inf, 0, 0, ""
     terms = system.terms(state)
     while True:

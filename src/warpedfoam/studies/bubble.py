@@ -11,7 +11,7 @@ from warpedfoam.arrays import Floats, as_choice, as_floats, as_instance, as_inte
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.kernels.lateral_film import film_grid, region_moments, region_points, resampled, truncation
 from warpedfoam.studies.chart import Chart, OutOfChart, angle_coordinates, tangent_coordinates
-from warpedfoam.studies.held import TOLERANCE, HeldBubble, Solved, solve, stiffness
+from warpedfoam.studies.held import HeldBubble, Solved, solve, stiffness
 
 #: Numbers of angles tried in turn, and the truncation that is good enough.
 ANGLES, RESOLVED = (17, 25, 37, 55), 1e-9
@@ -65,7 +65,8 @@ class BubbleBetweenPlates:
     is_minimum : bool
         Whether no small change of the film's shape lowers the energy; under "free" of its place neither.
     converged : bool
-        Residual and errors below 1e-9, and a minimum.
+        Residual and errors below 1e-9 (round-off, where that is more: in gaps of a thousandth of the radius),
+        and a minimum.
     iterations : int
         Newton steps on the last grid.
     message : str
@@ -241,7 +242,7 @@ def _held(task: _Task, point: Floats) -> BubbleBetweenPlates:
             raise task.too_large(point) from None
         radii, multipliers = solved.state.radii, solved.multipliers
         left = truncation(grid, radii, solved.state.nodes.points)
-        if left <= RESOLVED or solved.worst > TOLERANCE:
+        if left <= RESOLVED or solved.worst > held.tolerance:
             break
     assert solved is not None
     return _report(task, held, solved, left, force_turns=angular is None)
@@ -268,7 +269,7 @@ def _report(
         shape = task.cell.surface.shape_operators(chart.origin[None], project=False)[0]
         lever = float(away @ chart.frame[2]) * (chart.frame[:2] @ shape @ chart.frame[:2].T)
         slope = slope + lever @ slope
-    met = solved.worst <= TOLERANCE
+    met = solved.worst <= held.tolerance
     softest = stiffness(held, solved)
     minimum = softest > 0.0
     return BubbleBetweenPlates(

@@ -22,8 +22,9 @@ MOST_STEPS, LONGEST = 40, 0.25
 LEAST_SHARE = 0.05
 #: Force in units of γ d and relative errors of the constraints at which the method stops.
 TIGHT = 1e-12
-#: A run that stops improving counts if it came as far as this.
-TOLERANCE = 1e-9
+#: A run that stops improving counts if it came as far as this, or to this many times the round-off of places
+#: through a thin gap: ε size ρ / d².
+TOLERANCE, ROUNDING = 1e-9, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,17 @@ class HeldBubble:
     grid: FilmGrid
     volume: float
     coordinates: Coordinates
+
+    @property
+    def radius(self) -> float:
+        """sqrt(V / (π d))."""
+        return float(np.sqrt(self.volume / (np.pi * self.grid.heights[-1])))
+
+    @property
+    def tolerance(self) -> float:
+        """Residual and fault of a bubble at rest."""
+        gap, size = float(self.grid.heights[-1]), self.chart.surface.size
+        return max(TOLERANCE, ROUNDING * float(np.finfo(float).eps) * size * self.radius / gap**2)
 
     def state(self, radii: Floats) -> State:
         """Energy, constraints and their derivatives at the radii (n_free, m)."""
@@ -127,7 +139,7 @@ class Solved:
 
 def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
     """Newton steps from the given radii and multipliers until nothing improves."""
-    size = float(np.sqrt(held.volume / (np.pi * held.grid.heights[-1])))
+    size = held.radius
     # what makes each constraint's error relative
     scale = held.volume * np.array([1.0, size, size])
     target = np.array([held.volume, 0.0, 0.0])
@@ -147,7 +159,7 @@ def solve(held: HeldBubble, radii: Floats, multipliers: Floats) -> Solved:
         stale = 0 if best is None or reached.worst < 0.5 * best.worst else stale + 1
         if best is None or reached.worst < best.worst:
             best = reached
-        if best.worst <= TIGHT or (stale >= 2 and best.worst <= TOLERANCE):
+        if best.worst <= TIGHT or (stale >= 2 and best.worst <= held.tolerance):
             break
         hessian = held.hessian(state, multipliers)
         n = len(pull)
