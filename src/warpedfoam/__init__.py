@@ -61,12 +61,22 @@ from warpedfoam.plot import (
     plot_defects,
     plot_foam,
     plot_order,
+    plot_potential,
     plot_sides,
     save_figure,
     save_picture,
 )
-from warpedfoam.relax import Relaxation, relax
-from warpedfoam.studies import GeodesicCircle, geodesic_circle
+from warpedfoam.relax import LayeredRelaxation, Relaxation, relax
+from warpedfoam.studies import (
+    BubbleBetweenPlates,
+    GeodesicCircle,
+    GeometricPotential,
+    bubble_between_plates,
+    drift_path,
+    geodesic_circle,
+    geometric_potential,
+    write_potential_csv,
+)
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
@@ -97,6 +107,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BondOrder",
+    "BubbleBetweenPlates",
     "Catenoid",
     "CellNetwork",
     "ChargeEnergies",
@@ -113,10 +124,12 @@ __all__ = [
     "FoamStatistics",
     "GeodesicCircle",
     "GeodesicDistances",
+    "GeometricPotential",
     "Graph",
     "HeatGeodesics",
     "HeleShawCell",
     "Implicit",
+    "LayeredRelaxation",
     "LevelSurface",
     "MeshError",
     "MeshSurface",
@@ -133,16 +146,19 @@ __all__ = [
     "TriangleMesh",
     "WarpedFoamError",
     "bond_order",
+    "bubble_between_plates",
     "charge_energies",
     "charge_in",
     "charge_profile",
     "correlations",
     "defects",
+    "drift_path",
     "equilibrium_report",
     "foam_statistics",
     "geodesic_circle",
     "geodesic_distances",
     "geodesic_report",
+    "geometric_potential",
     "load",
     "mesh_report",
     "network_from_loops",
@@ -152,6 +168,7 @@ __all__ = [
     "plot_defects",
     "plot_foam",
     "plot_order",
+    "plot_potential",
     "plot_sides",
     "read_mesh",
     "relax",
@@ -167,5 +184,6 @@ __all__ = [
     "write_columns_csv",
     "write_films_csv",
     "write_ply",
+    "write_potential_csv",
     "write_record",
 ]

@@ -5,6 +5,7 @@ from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, pl
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
 from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
 from warpedfoam.plot.paper_figures import figure_curvature, figure_gap, figure_spheres, figure_torus_energy
+from warpedfoam.plot.potential_picture import plot_potential
 from warpedfoam.plot.surface_pictures import figure_circles, figure_surface
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "plot_defects",
     "plot_foam",
     "plot_order",
+    "plot_potential",
     "plot_sides",
     "save_figure",
     "save_picture",

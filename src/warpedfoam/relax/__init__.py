@@ -1,6 +1,7 @@
 """Relaxation of foams: Newton's method on energy and volumes, with T1s between the steps."""
 
 from warpedfoam.relax.driver import relax
+from warpedfoam.relax.layered import LayeredRelaxation
 from warpedfoam.relax.result import Relaxation
 
-__all__ = ["Relaxation", "relax"]
+__all__ = ["LayeredRelaxation", "Relaxation", "relax"]

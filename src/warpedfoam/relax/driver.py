@@ -14,6 +14,7 @@ from warpedfoam.kernels.condense import Condensed
 from warpedfoam.moves.t1 import T1Event
 from warpedfoam.relax.held import moved_points
 from warpedfoam.relax.kkt import KKT
+from warpedfoam.relax.layered import relax_layers, require_lines
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
 from warpedfoam.relax.result import Relaxation
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
@@ -74,6 +75,7 @@ def relax(
     foam: Foam,
     *,
     order: int | None = None,
+    layers: int = 1,
     t1: bool = True,
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
@@ -93,6 +95,10 @@ def relax(
     foam : Foam
     order : int, optional
         p of the films, 2 … 24; the foam's own by default. 4 for daily use, 8 for checks.
+    layers : int, optional
+        Layers of each film across the gap, 1 … 8. One layer is ruled along the surface's normals. With 2 or
+        more the relaxed ruled foam is let go: its films slide on the plates, meet them at 90° and bulge in
+        between, and the result is a `LayeredRelaxation`.
     t1 : bool, optional
         Whether films may turn. Without T1s a film that wants to vanish keeps the foam from
         converging, which is reported.
@@ -131,6 +137,9 @@ def relax(
     tol = as_number(tolerance, "tolerance", minimum=1e-13, maximum=1e-3)
     limit = as_integer(max_iterations, "max_iterations", minimum=0)
     p = as_integer(foam.order if order is None else order, "order", minimum=2, maximum=MAX_ORDER)
+    across = as_integer(layers, "layers", minimum=1, maximum=8)
+    if across > 1:
+        require_lines(foam)
     method = factoriser(solver, foam.n_bubbles)
     start = foam.with_order(p)
     system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles)
@@ -161,7 +170,7 @@ def relax(
         film_offsets=state.offsets,
         pressures=pressures,
     )
-    return Relaxation(
+    ruled = Relaxation(
         foam=final,
         energy=final.energy,
         pressures=pressures,
@@ -174,6 +183,11 @@ def relax(
         timings=MappingProxyType(dict(system.timings)),
         message=_message(converged, residuals, run, tol, limit),
     )
+    if across == 1:
+        return ruled
+    if not converged:
+        return replace(ruled, message=f"{ruled.message}; the films were not let go to bulge")
+    return relax_layers(ruled, across, tol)
 
 
 def _adds_up(run: _Run) -> bool:
