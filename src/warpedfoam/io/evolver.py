@@ -121,7 +121,8 @@ def _head(foam: Foam, formulas: Formulas) -> list[str]:
         form = formulas.one_form(place)
         lines += [
             "",
-            f"quantity bubble_{foam.bubble_ids[place]} fixed = {targets[place]!r} method edge_vector_integral",
+            f"quantity bubble_{foam.bubble_ids[place]} fixed = {targets[place]!r} "
+            "method edge_vector_integral",
             "vector_integrand:",
             *(f"q{k + 1}: {part}" for k, part in enumerate(form)),
         ]

@@ -68,7 +68,8 @@ class EvolverDump:
                 + (f" and no {missing[0]}" if missing else "")
             )
         values = np.array([*(self.pressures[name] for name in names), 0.0])
-        return values - values.mean()
+        out: Floats = values - values.mean()
+        return out
 
 
 def read_dmp(path: PathLike) -> EvolverDump:
