@@ -63,7 +63,9 @@ def write_glb(
     mesh.vertex_attributes["_QUALITY"] = colours.values[patches.point_bubble].astype(np.float32)
     scene = trimesh.Scene()
     scene.add_geometry(mesh, geom_name="bubbles", node_name="bubbles")
-    data: bytes = trimesh.exchange.gltf.export_glb(scene, include_normals=True)
+    data: bytes = trimesh.exchange.gltf.export_glb(  # type: ignore[no-untyped-call]
+        scene, include_normals=True
+    )
     with atomic_binary(target) as stream:
         stream.write(data)
     return target

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from warpedfoam.arrays import Floats, Ints, as_indices, as_instance, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import FileFormatError, TopologyError
-from warpedfoam.foam import MAX_ORDER, Foam
+from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
 from warpedfoam.io.atomic import PathLike, as_path
 from warpedfoam.io.polygon_files import obj_polygons, ply_polygons
 from warpedfoam.io.reading import existing
@@ -158,7 +158,25 @@ def _foam(
     tails_at, heads_at = on[heads[:, 0]], on[heads[:, 1]]
     offsets = _fitted(cell, tails_at, heads_at, films, on[inner], places, order)
     kept = np.unique(heads)
-    return Foam(cell, short, on[kept], offsets)
+    return Foam(cell, short, on[kept], offsets, _volumes(cell, short, on[kept], offsets))
+
+
+def _volumes(cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats) -> Floats:
+    """The bubbles' volumes, made to add up: their quadrature has an error."""
+    volumes = bubble_integrals(cell, network, points, offsets, cell.layer)
+    total = float(volumes.sum())
+    if (network.bubble_euler == 1).all() and not abs(total - cell.volume) <= (
+        cell.surface.precision * cell.volume
+    ):
+        raise TopologyError(
+            f"the polygons cover {total / cell.volume:.6g} times the cell's volume; they must cover the "
+            "surface once, without folds"
+        )
+    if not (volumes > 0.0).all():
+        bad = int(np.argmin(volumes))
+        raise TopologyError(f"polygon {bad} has the volume {volumes[bad]:.3g}; it is empty or inside out")
+    out: Floats = volumes * (cell.volume / total)
+    return out
 
 
 def _projected(cell: HeleShawCell, points: Floats, used: Ints, allowed: float) -> Floats:
