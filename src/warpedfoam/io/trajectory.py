@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import secrets
@@ -18,6 +19,15 @@ from warpedfoam.arrays import Floats, as_instance, as_integer, as_number, frozen
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path, writable_path
+from warpedfoam.io.hdf5_superblock import (
+    SUPERBLOCK,
+    USER_BLOCK,
+    in_use,
+    is_open,
+    mark_open,
+    released,
+    seal,
+)
 from warpedfoam.io.reading import existing, extra
 from warpedfoam.io.state import arrays_of, foam_of, known_surfaces
 
@@ -136,6 +146,7 @@ class TrajectoryWriter:
         if self._file is not None:
             self._file.close()
             self._file = None
+            seal(self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -157,6 +168,7 @@ class TrajectoryWriter:
                         _put(fresh, old._arrays(k), float(old.times[k]), flush=False)
                 finally:
                     fresh.close()
+                seal(temporary)
                 os.replace(temporary, target)
             except BaseException:
                 temporary.unlink(missing_ok=True)
@@ -165,6 +177,7 @@ class TrajectoryWriter:
             self._time = float(old.times[-1]) if len(old) else -np.inf
         self._file = self._h5py.File(target, "r+", libver="latest")
         self._file.swmr_mode = True
+        mark_open(target)
 
 
 class Trajectory:
@@ -275,7 +288,7 @@ class Trajectory:
 
 def _created(h5py: Any, path: Path, cell: tuple[str, Arrays]) -> Any:
     """A new file in single-writer mode, all its datasets there."""
-    file = h5py.File(path, "x" if not path.exists() else "r+", libver="latest")
+    file = h5py.File(path, "x", libver="latest", userblock_size=USER_BLOCK)
     try:
         file.attrs["format"] = FORMAT
         file.attrs["version"] = VERSION
@@ -295,6 +308,7 @@ def _created(h5py: Any, path: Path, cell: tuple[str, Arrays]) -> Any:
         file["index"].attrs["columns"] = ", ".join([*(f"end of {name}" for name in _DATA), "checksum"])
         file.flush()
         file.swmr_mode = True
+        mark_open(path)
     except BaseException:
         file.close()
         raise
@@ -330,10 +344,18 @@ def _put(file: Any, arrays: Mapping[str, NDArray[Any]], time: float, *, flush: b
 
 
 def _opened(h5py: Any, path: Path) -> Any:
-    try:
+    """The file for reading; of one that is still being written, or whose writer was killed, a copy in memory.
+
+    HDF5's own way to read such a file waits for its writer, for ever if the file is damaged.
+    """
+    if not is_open(path):
         return h5py.File(path, "r")
-    except OSError:  # still being written, or its writer was killed
-        return h5py.File(path, "r", libver="latest", swmr=True)
+    data = bytearray(path.read_bytes())
+    block = slice(USER_BLOCK, USER_BLOCK + SUPERBLOCK)
+    if not in_use(bytes(data[block])):
+        raise FileFormatError("its writer ended before the first frame, or it is damaged")
+    data[block] = released(bytes(data[block]), len(data))
+    return h5py.File(io.BytesIO(data), "r")
 
 
 def _checked(h5py: Any, file: Any) -> tuple[str, Arrays]:
@@ -343,7 +365,7 @@ def _checked(h5py: Any, file: Any) -> tuple[str, Arrays]:
     version = file.attrs.get("version")
     if version != VERSION:
         raise FileFormatError(
-            f"it is of version {version!r}, this warpedfoam reads version {VERSION}; use a newer warpedfoam"
+            f"it is of version {version}, this warpedfoam reads version {VERSION}; use a newer warpedfoam"
         )
     missing = [name for name in (*_DATA, "time", "index") if not isinstance(file.get(name), h5py.Dataset)]
     if missing:

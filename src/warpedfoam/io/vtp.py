@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import binascii
 import xml.etree.ElementTree as ET
+import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
@@ -94,7 +95,9 @@ def write_vtp(
     """
     target = writable_path(path, suffixes=(".vtp",))
     as_instance(foam, "foam", Foam)
-    state = {STATE + name: array for name, array in arrays_of(foam).items()}
+    arrays = arrays_of(foam)
+    state = {STATE + name: array for name, array in arrays.items()}
+    state[STATE + "checksum"] = np.array([_checksum(arrays)])
     if time is not None:
         state["TimeValue"] = np.array([time], dtype=np.float64)
     part = as_choice(parts, "parts", PARTS)
@@ -206,12 +209,12 @@ def _write(
 
 
 def _array(name: str, values: NDArray[Any], more: str = "") -> str:
-    """A DataArray: its length in bytes and its bytes, each in base 64."""
+    """A DataArray: its length in bytes and its bytes, in base 64."""
     code = values.dtype.str[1:]
     kind = _TYPES[code]
     raw = np.ascontiguousarray(values, dtype="<" + code if code != "u1" else "u1").tobytes()
-    body = base64.b64encode(np.uint64(len(raw)).astype("<u8").tobytes()).decode("ascii")
-    body += base64.b64encode(raw).decode("ascii")
+    # one stream of length and bytes, as VTK reads it
+    body = base64.b64encode(len(raw).to_bytes(8, "little") + raw).decode("ascii")
     return f'<DataArray type="{kind}" Name={quoteattr(name)} {more} format="binary">{body}</DataArray>\n'
 
 
@@ -233,7 +236,18 @@ def _state(root: ET.Element) -> Arrays:
     ):  # one column or none has no shape of its own
         films = max(len(arrays["next"]) // 2, 1)
         arrays["film_offsets"] = arrays["film_offsets"].reshape(films, -1)
+    told = arrays.pop("checksum", None)
+    if told is None or told.tolist() != [_checksum(arrays)]:
+        raise FileFormatError("its checksum is missing or wrong: it is damaged")
     return arrays
+
+
+def _checksum(arrays: Arrays) -> int:
+    """CRC-32 of the bytes of all arrays, in the order of their names."""
+    total = 0
+    for name in sorted(arrays):
+        total = zlib.crc32(np.ascontiguousarray(arrays[name]).tobytes(), zlib.crc32(name.encode(), total))
+    return total
 
 
 def _values(entry: ET.Element, name: str) -> NDArray[Any]:
@@ -243,11 +257,11 @@ def _values(entry: ET.Element, name: str) -> NDArray[Any]:
     if code is None:
         raise FileFormatError(f"its array {name!r} is of type {entry.get('type')!r}")
     text = "".join((entry.text or "").split())
-    try:  # eight bytes fill twelve letters
-        length = int.from_bytes(base64.b64decode(text[:12], validate=True), "little")
-        raw = base64.b64decode(text[12:], validate=True)
+    try:
+        whole = base64.b64decode(text, validate=True)
     except binascii.Error as fault:
         raise FileFormatError(f"its array {name!r} is damaged ({fault})") from None
+    length, raw = int.from_bytes(whole[:8], "little"), whole[8:]
     if len(raw) != length:
         raise FileFormatError(f"its array {name!r} holds {len(raw)} bytes, not {length}")
     columns = int(entry.get("NumberOfComponents", "1"))
