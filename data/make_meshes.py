@@ -42,7 +42,7 @@ def two_rings_gradient(x: np.ndarray) -> np.ndarray:
     return share[:, None] * first + (1.0 - share)[:, None] * second
 
 
-#: Of the junction: radius and length of its tubes, softness of the merger, share of an edge that nodes are shaken by.
+#: Of the junction: radius and length of its tubes, softness of the merger; jitter in edges.
 TUBES, LONG, MELT, SHAKEN = 3.0, 11.0, 1.5, 0.15
 AXES = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.radians([90.0, 210.0, 330.0])])
 

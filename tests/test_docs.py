@@ -49,6 +49,13 @@ def test_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {"foam.ply", "foam_view.ply"}
 
 
+def test_formats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    space = run(ROOT / "docs" / "formats.md")
+    assert space["again"].n_bubbles == 30
+    assert {p.name for p in tmp_path.iterdir()} == {"foam.vtp", "foam.obj", "run.h5", "foam.fe"}
+
+
 def test_the_mesh_of_the_page_is_the_torus(surfaces: dict[str, Any]) -> None:
     assert surfaces["ring"].euler_characteristic == 0
     assert surfaces["ring"].area == pytest.approx(4 * np.pi**2 * 80, rel=1e-4)

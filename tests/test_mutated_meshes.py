@@ -23,14 +23,14 @@ ROOT = Path(__file__).parents[1]
 class Worker:
     """A process that answers cases; a case that ends it or hangs it is known by name."""
 
-    def __init__(self, limit: float = LIMIT) -> None:
-        self.limit = limit
+    def __init__(self, limit: float = LIMIT, module: str = "tests.mutated_meshes") -> None:
+        self.limit, self.module = limit, module
         self.process: subprocess.Popen[str] | None = None
 
     def start(self) -> subprocess.Popen[str]:
         one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tests.mutated_meshes"],
+            [sys.executable, "-m", self.module],
             cwd=ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -275,6 +275,48 @@ def defects(
             print(summary_text(facts), flush=True)
 
 
+FoamFile = Annotated[str, typer.Argument(help="A foam: NPZ, VTP or HDF5 of warpedfoam.", metavar="FOAM")]
+Frame = Annotated[int, typer.Option("--frame", help="Frame of a trajectory, from 0; -1 is the last.")]
+
+
+@app.command()
+def convert(
+    file: FoamFile,
+    targets: Annotated[
+        list[str],
+        typer.Argument(
+            help="Files to write; their endings tell the format: npz, h5, vtp, vtm, ply, glb, obj, "
+            "graphml, json, csv, parquet, fe.",
+            metavar="OUT...",
+        ),
+    ],
+    color_by: Annotated[
+        str | None, typer.Option("--color-by", help="Colour PLY and GLB by charge, pressure, sides or area.")
+    ] = None,
+    frame: Frame = -1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write a foam in other formats, such as foam.npz to out.vtp for ParaView or out.glb for browsers."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.converting import convert as converted
+
+        text, facts = converted(file, targets, color_by=color_by, frame=frame)
+        if as_json or not quiet:
+            print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+
+
+@app.command()
+def info(file: FoamFile, frame: Frame = -1, as_json: Json = False, debug: Debug = False) -> None:
+    """Tell what foam is in a file: surface, bubbles, sides, energy."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.converting import info as told
+
+        text, facts = told(file, frame=frame)
+        print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+
+
 def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
     foam = {name: given[name] for name in ("n_bubbles", "seeds", "cells", "lloyd")}
@@ -366,7 +408,7 @@ def _ending_well(debug: bool) -> Iterator[None]:
         # the files are written; that nobody reads the summary is no fault
         raise typer.Exit(CLOSED_PIPE) from None
     except Exception as fault:
-        bad = isinstance(fault, (ValueError, TypeError, OSError))
+        bad = isinstance(fault, (ValueError, TypeError, OSError, ImportError))
         if debug or not (bad or isinstance(fault, ConvergenceError)):
             traceback.print_exc()
         if isinstance(fault, OSError) and fault.strerror and fault.filename:

@@ -69,6 +69,20 @@ def save(path: PathLike, foam: Foam) -> Path:
     >>> folder.cleanup()
     """
     target = writable_path(path)
+    arrays = arrays_of(foam)
+    with atomic_binary(target) as stream:
+        np.savez(stream, allow_pickle=False, **arrays)
+    return target
+
+
+def arrays_of(foam: Foam) -> Arrays:
+    """The arrays of a foam and its ``header``, as `save` and other formats write them.
+
+    Raises
+    ------
+    TypeError
+        If ``foam`` is not a Foam, or its surface is not a dataclass of numbers and arrays.
+    """
     as_instance(foam, "foam", Foam)
     network = foam.network
     arrays: Arrays = {
@@ -95,9 +109,7 @@ def save(path: PathLike, foam: Foam) -> Path:
     }
     text = json.dumps(header, allow_nan=False, sort_keys=True)
     arrays["header"] = np.frombuffer(text.encode("utf-8"), dtype=np.uint8)
-    with atomic_binary(target) as stream:
-        np.savez(stream, allow_pickle=False, **arrays)
-    return target
+    return arrays
 
 
 def load(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
@@ -141,16 +153,22 @@ def load(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
     if not source.is_file():
         raise FileFormatError(f"cannot read {source}: it is not a file")
     data = source.read_bytes()
-    known = {name: getattr(_surfaces, name) for name in _surfaces.__all__}
-    known.update({kind.__name__: kind for kind in surfaces})
+    known = known_surfaces(surfaces)
     try:
-        return _foam(_members(data), known)
+        return foam_of(_members(data), known)
     except FileFormatError as fault:
         raise FileFormatError(f"cannot read {source}: {fault}") from None
     except Exception as fault:  # whatever a damaged file makes the parsers raise
         raise FileFormatError(
             f"cannot read {source}: it is no foam of warpedfoam or it is damaged ({fault})"
         ) from fault
+
+
+def known_surfaces(own: Iterable[type] = ()) -> dict[str, type]:
+    """Surface classes by name: those of `warpedfoam.surfaces`, and the caller's own."""
+    known = {name: getattr(_surfaces, name) for name in _surfaces.__all__}
+    known.update({kind.__name__: kind for kind in own})
+    return known
 
 
 def _members(data: bytes) -> Arrays:
@@ -183,7 +201,14 @@ def _array(raw: bytes, name: str) -> NDArray[Any]:
     return np.frombuffer(body, dtype=dtype).reshape(shape)
 
 
-def _foam(arrays: Arrays, known: Mapping[str, type]) -> Foam:
+def foam_of(arrays: Arrays, known: Mapping[str, type]) -> Foam:
+    """The foam of `arrays_of`.
+
+    Raises
+    ------
+    FileFormatError
+        If something is missing, of the wrong type, or not known here; other errors of `Foam` may follow.
+    """
     if "header" not in arrays:
         raise FileFormatError("it has no header: it is not a foam of warpedfoam")
     header = json.loads(arrays["header"].tobytes().decode("utf-8"))

@@ -42,9 +42,14 @@ def write_bubbles_csv(path: PathLike, foam: Foam) -> Path:
         If the path cannot be written.
     """
     target = writable_path(path)
+    return _write(target, bubble_columns(foam))
+
+
+def bubble_columns(foam: Foam) -> Columns:
+    """The columns of `write_bubbles_csv`; pressures that are not there are None."""
     network = as_instance(foam, "foam", Foam).network
     x, y, z = foam.bubble_centres.T
-    columns: Columns = {
+    return {
         "id": foam.bubble_ids.tolist(),
         "x": x.tolist(),
         "y": y.tolist(),
@@ -53,11 +58,10 @@ def write_bubbles_csv(path: PathLike, foam: Foam) -> Path:
         "charge": network.charges.tolist(),
         "area": foam.bubble_areas.tolist(),
         "volume": foam.bubble_volumes.tolist(),
-        "pressure": _or_blank(foam.pressures, foam.n_bubbles),
+        "pressure": _or_none(foam.pressures, foam.n_bubbles),
         "energy_share": _energy_shares(foam).tolist(),
         "gaussian_curvature": (foam.bubble_curvatures / foam.bubble_areas).tolist(),
     }
-    return _write(target, columns)
 
 
 def write_films_csv(path: PathLike, foam: Foam) -> Path:
@@ -85,10 +89,15 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
         If the path cannot be written.
     """
     target = writable_path(path)
+    return _write(target, film_columns(foam))
+
+
+def film_columns(foam: Foam) -> Columns:
+    """The columns of `write_films_csv`; pressure jumps that are not there are None."""
     network = as_instance(foam, "foam", Foam).network
     x, y, z = foam.film_curves_at(np.array([0.5]))[:, 0].T
     jump = None if foam.pressures is None else foam.pressures[network.left] - foam.pressures[network.right]
-    columns: Columns = {
+    return {
         "film": list(range(network.n_films)),
         "left": foam.bubble_ids[network.left].tolist(),
         "right": foam.bubble_ids[network.right].tolist(),
@@ -96,12 +105,11 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
         "head": network.heads.tolist(),
         "length": foam.film_lengths.tolist(),
         "area": foam.film_areas.tolist(),
-        "pressure_jump": _or_blank(jump, network.n_films),
+        "pressure_jump": _or_none(jump, network.n_films),
         "x": x.tolist(),
         "y": y.tolist(),
         "z": z.tolist(),
     }
-    return _write(target, columns)
 
 
 def write_columns_csv(path: PathLike, columns: Mapping[str, NDArray[Any]]) -> Path:
@@ -140,8 +148,8 @@ def _energy_shares(foam: Foam) -> Floats:
     return np.bincount(foam.network.bubble, halves, minlength=foam.n_bubbles).astype(np.float64)
 
 
-def _or_blank(values: Floats | None, count: int) -> list[Any]:
-    return [""] * count if values is None else values.tolist()
+def _or_none(values: Floats | None, count: int) -> list[Any]:
+    return [None] * count if values is None else values.tolist()
 
 
 def _write(target: Path, columns: Columns) -> Path:

@@ -1,0 +1,133 @@
+"""The same foams by warpedfoam and by the Surface Evolver: energies, pressures and times, side by side.
+
+    python benchmarks/against_evolver.py                 the table
+    python benchmarks/against_evolver.py --record DIR    also the foams and the Evolver's answers, for tests
+
+Needs the program ``evolver`` (Debian: evolver-nox). Each foam is relaxed by warpedfoam from Voronoi cells;
+its films as 4, 8 and 16 chords then go to the Evolver, which solves from there by its own Newton steps. The
+last two levels are extrapolated in chord length squared; the error of that is taken from the first two.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+import warpedfoam as wf
+
+SURFACES = {"sphere": wf.Sphere(1.0), "torus": wf.Torus(2.0, 1.0)}
+SIZES, GAP, ORDER, SEED = (12, 50, 200), 0.1, 8, 0
+LEVELS, STEPS = (4, 8, 16), 5
+
+
+def evolved(path: Path, steps: int = STEPS, timeout: float = 300.0) -> tuple[wf.EvolverDump, float, bool]:
+    """The Evolver's own solution of a datafile, its time, and whether it calls every Hessian positive."""
+    dump = path.with_suffix(".dmp")
+    # scale 0: the first step computes pressures and volumes and moves nothing downhill
+    orders = ["m 0", "g 1", *["hessian"] * steps, f'dump "{dump}"', "q", "q", ""]
+    start = time.perf_counter()
+    done = subprocess.run(
+        ["evolver", str(path)], input="\n".join(orders), text=True, capture_output=True, timeout=timeout
+    )
+    took = time.perf_counter() - start
+    said = done.stdout + done.stderr
+    energies = [float(e) for e in re.findall(r"energy:\s+([-\d.eE+]+)", said)]
+    if not dump.exists() or len(energies) != steps + 1 or abs(energies[-1] / energies[-2] - 1.0) > 1e-11:
+        raise RuntimeError(f"the Evolver did not converge: {said[-2000:]}")
+    return wf.read_dmp(dump), took, "not positive" not in said
+
+
+def extrapolated(values: list) -> list:
+    """Richardson's values, the error's leading term being the chord length squared."""
+    return [(4.0 * fine - coarse) / 3.0 for coarse, fine in pairwise(values)]
+
+
+def compared(kind: str, count: int, folder: Path) -> tuple[dict[str, object], wf.Foam]:
+    """One foam by both programs."""
+    cell = wf.HeleShawCell(SURFACES[kind], GAP)
+    raw = wf.voronoi_foam(cell, count, seeds="blue", seed=SEED)
+    ours = {}
+    for order in (4, ORDER):
+        start = time.perf_counter()
+        relaxed = wf.relax(raw, order=order)
+        ours[order] = time.perf_counter() - start
+    start = time.perf_counter()
+    wf.relax(relaxed.foam, order=ORDER)
+    again = time.perf_counter() - start
+    foam = relaxed.foam
+    assert relaxed.converged
+    energies, pressures, times, positive = [], [], [], []
+    for segments in LEVELS:
+        path = wf.write_fe(folder / f"{kind}_{count}_{segments}.fe", foam, segments=segments)
+        dump, took, minimum = evolved(path)
+        energies.append(dump.energy)
+        pressures.append(dump.bubble_pressures(foam))
+        times.append(took)
+        positive.append(minimum)
+    row = {
+        "surface": kind, "bubbles": count, "energy": foam.energy, "ours_s": ours, "again_s": again,
+        "evolver_s": times, "energies": energies, "pressures": [p.tolist() for p in pressures],
+        "minimum": positive,
+    }  # fmt: skip
+    return row, foam
+
+
+def errors(row: dict, pressures: np.ndarray) -> dict[str, float]:
+    """Relative differences after extrapolation, and the extrapolation's own errors."""
+    energy, p = extrapolated(row["energies"]), extrapolated([np.array(v) for v in row["pressures"]])
+    spread = np.ptp(pressures)
+    return {
+        "energy_coarse": abs(row["energies"][-1] / row["energy"] - 1.0),
+        "energy": abs(energy[-1] / row["energy"] - 1.0),
+        "energy_error": abs(energy[-1] - energy[0]) / row["energy"],
+        "pressure": float(np.abs(p[-1] - pressures).max() / spread),
+        "pressure_error": float(np.abs(p[-1] - p[0]).max() / spread),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--record", type=Path, help="folder for foams and answers")
+    record = parser.parse_args().record
+    if shutil.which("evolver") is None:
+        raise SystemExit("the program evolver is not installed (Debian: apt-get install evolver-nox)")
+    print(
+        "| foam | energy: 16 chords | extrapolated | its error | pressures | their error "
+        "| warpedfoam p = 4 | p = 8 | again | Evolver 4 | 8 | 16 chords |"
+    )
+    print("| --- " * 12 + "|")
+    with tempfile.TemporaryDirectory() as name:
+        wf.relax(wf.voronoi_foam(wf.HeleShawCell(wf.Sphere(1.0), GAP), 20))  # warm up
+        for count in SIZES:
+            for kind in SURFACES:
+                row, foam = compared(kind, count, Path(name))
+                e = errors(row, foam.pressures)
+                print(
+                    f"| {kind} {count} | {e['energy_coarse']:.1e} | {e['energy']:.1e} "
+                    f"| {e['energy_error']:.1e} | {e['pressure']:.1e} | {e['pressure_error']:.1e} "
+                    f"| {row['ours_s'][4]:.2f} s "
+                    f"| {row['ours_s'][ORDER]:.2f} s | {row['again_s']:.2f} s | "
+                    + " | ".join(f"{t:.2f} s" for t in row["evolver_s"])
+                    + " |",
+                    flush=True,
+                )
+                if record is not None:
+                    wf.save(record / f"{kind}_{count}.npz", foam)
+                    kept = {k: row[k] for k in ("surface", "bubbles", "energies", "pressures", "minimum")}
+                    (record / f"{kind}_{count}.json").write_text(json.dumps(kept) + "\n")
+                    if (kind, count) == ("sphere", 12):
+                        text = (Path(name) / "sphere_12_4.dmp").read_text()
+                        (record / "sphere_12.dmp").write_text(text.replace(f"{name}/", ""))
+
+
+if __name__ == "__main__":
+    main()
