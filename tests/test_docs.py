@@ -61,6 +61,13 @@ def test_the_mesh_of_the_page_is_the_torus(surfaces: dict[str, Any]) -> None:
     assert surfaces["ring"].area == pytest.approx(4 * np.pi**2 * 80, rel=1e-4)
 
 
+def test_the_foam_with_rims_of_the_page(surfaces: dict[str, Any]) -> None:
+    foam = surfaces["open_foam"]
+    assert len(foam.walls.bubble) > 10
+    assert foam.network.charges.sum() == 0
+    assert wf.equilibrium_report(foam).wall_error < 0.05 / 6.0
+
+
 def test_the_how_to_is_short() -> None:
     classes = [
         (block, node)
