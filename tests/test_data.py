@@ -1,4 +1,4 @@
-"""The mesh files in data/ are what their script makes, closed and of the right topology."""
+"""The mesh files in data/ are what their script makes, of the right topology, and carry foams."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ def load(path: Path) -> trimesh.Trimesh:
 
 
 def test_every_file_is_tested(script: ModuleType) -> None:
-    assert {p.name for p in DATA.glob("*.ply")} == set(EULER) == set(script.SURFACES)
+    assert {p.name for p in DATA.glob("*.ply")} == {*EULER, "junction.ply"}
+    assert set(EULER) == set(script.SURFACES)
 
 
-@pytest.mark.parametrize("name", EULER)
+@pytest.mark.parametrize("name", [*EULER, "junction.ply"])
 def test_files_are_what_the_script_makes(script: ModuleType, name: str, tmp_path: Path) -> None:
     made = {p.name: p for p in script.main(tmp_path)}[name]
     stored, fresh = load(DATA / name), load(made)
@@ -56,6 +57,26 @@ def test_files_are_closed_surfaces(script: ModuleType, name: str) -> None:
     assert off < 1e-6 * surface.size  # single precision
     assert load(path).volume > 0.0  # triangles counter-clockwise seen from outside
     assert mesh.area == pytest.approx(surface.area, rel=0.01)
+
+
+def test_the_junction_ends_in_three_rims_and_carries_a_foam(script: ModuleType) -> None:
+    surface = wf.MeshSurface.from_file(DATA / "junction.ply")
+    assert (surface.euler_characteristic, surface.rim.n_loops) == (-1, 3)
+    assert all(len(sides) == 1 for sides in surface.rim_loops())  # no corners
+    for k in range(3):
+        u = np.linspace(0.0, surface.rim.lengths[k], 50)
+        points = surface.rim.at(np.full(50, k), u)
+        # each rim lies in the plane of its cut, and the surface on the function's
+        cut = script.AXES @ points.mean(axis=0)
+        np.testing.assert_allclose(points @ script.AXES[cut.argmax()], script.LONG, atol=2e-3)
+        assert np.abs(script.three_tubes(points)).max() < 2e-3
+    start = wf.voronoi_foam(wf.HeleShawCell(surface, gap=0.3), 120, seeds="blue", seed=0)
+    result = wf.relax(start)
+    assert result.converged
+    assert result.is_minimum
+    assert result.foam.network.charges.sum() == -6
+    total = result.foam.bubble_curvatures.sum() + result.foam.wall_turning.sum()
+    assert total == pytest.approx(-2 * np.pi, abs=1e-2)
 
 
 def test_the_double_torus_carries_a_foam(script: ModuleType) -> None:
