@@ -484,3 +484,8 @@ def test_reports_know_walls():
     )
     assert closed.wall_error == 0.0
     assert len(closed.wall_angles) == 0
+
+
+def test_films_that_bulge_are_refused_at_rims():
+    with pytest.raises(ValueError, match="layers above 1 need a surface without rims"):
+        relax(relaxed_plate_once(), layers=3)

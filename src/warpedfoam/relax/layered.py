@@ -228,13 +228,18 @@ class LayeredSystem:
 
 
 def require_lines(foam: Foam) -> None:
-    """Refuse foams with marker vertices, whose lines could slide along their films.
+    """Refuse foams with marker vertices, whose lines could slide along their films, and with rims.
 
     Raises
     ------
     ValueError
         If there are any.
     """
+    if foam.cell.surface.rim is not None:
+        raise ValueError(
+            "layers above 1 need a surface without rims: films that bulge against a wall are not available; "
+            "relax the foam with layers=1"
+        )
     if len(foam.network.markers):
         raise ValueError(
             "layers above 1 need a foam without marker vertices (where only two films meet), this one has "
