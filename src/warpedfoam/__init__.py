@@ -92,6 +92,7 @@ from warpedfoam.tessellate import (
     geodesic_report,
     voronoi_foam,
 )
+from warpedfoam.view import write_view
 
 __version__ = "0.1.0"
 
@@ -168,4 +169,5 @@ __all__ = [
     "write_films_csv",
     "write_ply",
     "write_record",
+    "write_view",
 ]
