@@ -9,6 +9,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -23,6 +24,14 @@ FLAGS = [
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--disable-dev-shm-usage", "--mute-audio", "--force-color-profile=srgb", "--remote-debugging-pipe",
 ]  # fmt: skip
+# The browser reads commands from descriptor 3 and answers on 4.
+_LAUNCH = """
+import fcntl, os, sys
+ends = [fcntl.fcntl(int(n), fcntl.F_DUPFD, 10) for n in sys.argv[1:3]]
+for end, place in zip(ends, (3, 4)):
+    os.dup2(end, place)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
 #: Seconds that any one command may take on a busy machine.
 PATIENCE = 90.0
 
@@ -42,10 +51,9 @@ class Browser:
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         to_read, to_write = os.pipe()
         from_read, from_write = os.pipe()
-        # the browser reads commands from descriptor 3 and answers on 4; the shell puts them there
-        script = f'exec "$0" "$@" 3<&{to_read} 4>&{from_write}'
+        command = [path, *FLAGS, f"--user-data-dir={self._folder.name}", "about:blank"]
         self._process = subprocess.Popen(
-            ["/bin/sh", "-c", script, path, *FLAGS, f"--user-data-dir={self._folder.name}", "about:blank"],
+            [sys.executable, "-c", _LAUNCH, str(to_read), str(from_write), *command],
             pass_fds=(to_read, from_write),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -58,11 +66,20 @@ class Browser:
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self._loaded = 0
-        targets = self._send("Target.getTargets")["targetInfos"]
-        (page,) = [t["targetId"] for t in targets if t["type"] == "page"][:1]
-        self._session = self._send("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log", "Network"):
-            self._send(f"{domain}.enable")
+        try:
+            targets = self._send("Target.getTargets")["targetInfos"]
+            (page,) = [t["targetId"] for t in targets if t["type"] == "page"][:1]
+            self._session = self._send("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+            for domain in ("Page", "Runtime", "Log", "Network"):
+                self._send(f"{domain}.enable")
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def pid(self) -> int:
+        """Number of the browser's process."""
+        return self._process.pid
 
     def close(self) -> None:
         """End the browser and remove what it wrote."""

@@ -20,12 +20,17 @@ from warpedfoam.view.frames import bounding_cube, frame_arrays, packed
 from warpedfoam.view.geometry import Geometry, detail, geometry
 from warpedfoam.view.scalars import SCALARS, Scalar, bubble_scalars
 
+# Surfaces that are called after somebody.
+_PROPER = {"SchwarzP": "Schwarz P surface"}
 #: Version of the data in the page; its scripts are written beside it and fit.
 VERSION = 1
 SUFFIXES = (".html", ".htm")
 SCRIPTS = ("maths.js", "frames.js", "shaders.js", "painter.js", "gestures.js", "panel.js", "viewer.js")
-# Pulls films towards the eye, in bubble sizes, so that they do not flicker in the patches that they bound.
-_PULL = 0.02
+# Films are pulled towards the eye, so that they do not flicker in the patches that they bound: by this many
+# bubble sizes, at most this share of the picture.
+_PULL, _MOST_PULL = 0.02, 0.004
+# More bubbles than these are also kept in fewer triangles: so many segments a film and rings a bubble.
+_MANY, _COARSE = 300, (2, 1)
 
 
 def write_view(
@@ -94,17 +99,19 @@ def write_view(
     frames = _frames(foams)
     name = as_choice(color_by, "color_by", SCALARS)
     if name == "pressure" and any(foam.pressures is None for foam in frames):
-        raise ValueError("color_by='pressure' needs pressures in every foam: relax them first (warpedfoam.relax)")
+        raise ValueError(
+            "color_by='pressure' needs pressures in every foam: relax them first (warpedfoam.relax)"
+        )
     words = _words(labels, len(frames))
     if title is not None and not isinstance(title, str):
         raise TypeError(f"title must be a string or None, got {type(title).__name__}")
     segments, rings = detail(max(foam.n_bubbles for foam in frames), len(frames))
-    drawn = [geometry(foam, segments, rings) for foam in frames]
-    scalars = bubble_scalars(frames, [g.curvature for g in drawn])
-    cube = bounding_cube(drawn)
+    drawn = [_meshes(foam, segments, rings) for foam in frames]
+    scalars = bubble_scalars(frames, [meshes[0].curvature for meshes in drawn])
+    cube = bounding_cube([mesh for meshes in drawn for mesh in meshes])
     layouts, texts = [], []
-    for number, (foam, part) in enumerate(zip(frames, drawn, strict=True)):
-        layout, text = packed(frame_arrays(foam, part, scalars, number, cube))
+    for number, (foam, meshes) in enumerate(zip(frames, drawn, strict=True)):
+        layout, text = packed(frame_arrays(foam, meshes, scalars, number, cube))
         layouts.append(layout)
         texts.append(text)
     facts = {
@@ -112,12 +119,12 @@ def write_view(
         "title": _heading(frames) if title is None else title,
         "colorBy": name,
         "cube": {"low": cube[0].tolist(), "side": cube[1]},
-        "view": _first_view(frames[0], drawn[0]),
+        "view": _first_view(frames[0], drawn[0][0]),
         "colours": {"film": FILM_COLOUR, "outside": OUTSIDE_COLOUR, "chargeRange": CHARGE_RANGE},
         "scalars": [_described(scalar) for scalar in scalars],
         "frames": [
-            _frame_facts(foam, part, layout, word)
-            for foam, part, layout, word in zip(frames, drawn, layouts, words, strict=True)
+            _frame_facts(foam, meshes, layout, word, cube[1])
+            for foam, meshes, layout, word in zip(frames, drawn, layouts, words, strict=True)
         ],
     }
     text = page(facts, texts)
@@ -160,6 +167,12 @@ def _frames(foams: object) -> tuple[Foam, ...]:
     return tuple(foams)
 
 
+def _meshes(foam: Foam, segments: int, rings: int) -> list[Geometry]:
+    """The foam as it is drawn, and more coarsely for when its many bubbles are small in the window."""
+    fine = geometry(foam, segments, rings)
+    return [fine] if foam.n_bubbles <= _MANY else [fine, geometry(foam, *_COARSE)]
+
+
 def _words(labels: object, count: int) -> list[str]:
     if labels is None:
         return [str(k + 1) for k in range(count)]
@@ -175,7 +188,7 @@ def _words(labels: object, count: int) -> list[str]:
 
 def _heading(foams: Sequence[Foam]) -> str:
     names = sorted({type(foam.cell.surface).__name__ for foam in foams})
-    kinds = [re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower() for name in names]
+    kinds = [_PROPER.get(name) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower() for name in names]
     counts = sorted({foam.n_bubbles for foam in foams})
     bubbles = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     return f"{bubbles} bubbles, {', '.join(kinds)}"
@@ -200,7 +213,9 @@ def _described(scalar: Scalar) -> dict[str, Any]:
     }
 
 
-def _frame_facts(foam: Foam, drawn: Geometry, layout: list[list[Any]], label: str) -> dict[str, Any]:
+def _frame_facts(
+    foam: Foam, meshes: Sequence[Geometry], layout: list[list[Any]], label: str, side: float
+) -> dict[str, Any]:
     surface = foam.cell.surface
     return {
         "label": label,
@@ -208,8 +223,9 @@ def _frame_facts(foam: Foam, drawn: Geometry, layout: list[list[Any]], label: st
         "energy": foam.energy,
         "gap": foam.cell.gap,
         "size": foam.bubble_size,
-        "pull": _PULL * foam.bubble_size,
-        "sink": float(drawn.sunk.max()),
+        "pull": min(_PULL * foam.bubble_size, _MOST_PULL * side),
+        "sink": max(float(mesh.sunk.max()) for mesh in meshes),
+        "meshes": len(meshes),
         # of a surface with edges in the picture the back is seen too
         "edged": surface.period is not None or surface.rim is not None,
         "layout": layout,

@@ -23,32 +23,28 @@ _ALIGN = 8
 Arrays = Mapping[str, NDArray[Any]]
 
 
-def bounding_cube(parts: Sequence[Geometry]) -> tuple[Floats, float]:
+def bounding_cube(meshes: Sequence[Geometry]) -> tuple[Floats, float]:
     """Lowest corner and side of a cube that holds all points."""
-    low = np.min([g.points.min(axis=0) for g in parts] + [g.line_points.min(axis=0) for g in parts], axis=0)
-    high = np.max([g.points.max(axis=0) for g in parts] + [g.line_points.max(axis=0) for g in parts], axis=0)
+    points = [part for g in meshes for part in (g.points, g.line_points)]
+    low = np.min([part.min(axis=0) for part in points], axis=0)
+    high = np.max([part.max(axis=0) for part in points], axis=0)
     side = float((high - low).max())
     return 0.5 * (low + high - side), side
 
 
 def frame_arrays(
-    foam: Foam, drawn: Geometry, scalars: Sequence[Scalar], frame: int, cube: tuple[Floats, float]
+    foam: Foam,
+    meshes: Sequence[Geometry],
+    scalars: Sequence[Scalar],
+    frame: int,
+    cube: tuple[Floats, float],
 ) -> dict[str, NDArray[Any]]:
-    """Arrays of frame number ``frame``; whole numbers that mostly rise evenly as their differences."""
-    (curvature,) = (s for s in scalars if s.name == "surface")
-    low, high = curvature.limits
-    share = (drawn.curvature - low) / (high - low) if high - low > 1e-9 * max(-low, high) else 0.5
-    share = np.broadcast_to(np.asarray(share), drawn.curvature.shape)
+    """Arrays of frame number ``frame``; whole numbers that mostly rise evenly as their differences.
+
+    ``meshes`` are the foam in one or more degrees of detail, finest first.
+    """
     network = foam.network
     arrays: dict[str, NDArray[Any]] = {
-        "points": _placed(drawn.points, share, cube),
-        "normals": _directions(drawn.normals, drawn.sunk > 0.0),
-        "owner": _steps(drawn.owner),
-        "triangles": _steps(drawn.triangles.T),
-        "line_points": _placed(drawn.line_points, np.zeros(len(drawn.line_points)), cube),
-        "line_normals": _directions(drawn.line_normals, np.zeros(len(drawn.line_points), dtype=bool)),
-        "segments": _steps(drawn.segments.T),
-        "beside": _steps(drawn.beside.T),
         "pairs": _steps(np.stack([network.left, network.right])),
         "ids": foam.bubble_ids.astype(np.float64),
         "euler": network.bubble_euler.astype(np.int32),
@@ -61,7 +57,31 @@ def frame_arrays(
             arrays[f"value:{scalar.name}"] = scalar.values[frame].astype(np.float64)
         if scalar.name != "surface":
             arrays[f"rgb:{scalar.name}"] = scalar.rgb[frame]
+    (curvature,) = (s for s in scalars if s.name == "surface")
+    for number, mesh in enumerate(meshes):
+        for name, array in _mesh_arrays(mesh, curvature.limits, cube).items():
+            arrays[f"mesh{number}:{name}"] = array
     return arrays
+
+
+def _mesh_arrays(
+    mesh: Geometry, limits: tuple[float, float], cube: tuple[Floats, float]
+) -> dict[str, NDArray[Any]]:
+    low, high = limits
+    # limits that differ by round-off only are one value, in the middle of the colour bar
+    wide = high - low > 1e-9 * max(-low, high)
+    share = (mesh.curvature - low) / (high - low) if wide else np.full(len(mesh.points), 0.5)
+    n_lines = len(mesh.line_points)
+    return {
+        "points": _placed(mesh.points, share, cube),
+        "normals": _directions(mesh.normals, mesh.sunk > 0.0),
+        "owner": _steps(mesh.owner),
+        "triangles": _steps(mesh.triangles.T),
+        "line_points": _placed(mesh.line_points, np.zeros(n_lines), cube),
+        "line_normals": _directions(mesh.line_normals, np.zeros(n_lines, dtype=bool)),
+        "segments": _steps(mesh.segments.T),
+        "beside": _steps(mesh.beside.T),
+    }
 
 
 def packed(arrays: Arrays) -> tuple[list[list[Any]], str]:

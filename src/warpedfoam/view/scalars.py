@@ -135,9 +135,10 @@ def _curvature(
 ) -> list[Scalar]:
     """Mean of each bubble, and the surface's own, in the same colours."""
     means = tuple(foam.bubble_curvatures / foam.bubble_areas for foam in foams)
-    # a plane's curvature is 0 but for round-off
+    # a plane's curvature is 0 but for round-off, a flat point's is seldom hit
     scale = max(foam.cell.surface.size for foam in foams) ** 2
-    low, high = (0.0 if abs(g) * scale < 1e-9 else g for g in limits)
+    least = max(1e-9 / scale, 1e-4 * max(-limits[0], limits[1]))
+    low, high = (0.0 if abs(g) < least else g for g in limits)
     diverging = low < 0.0 < high
     if diverging:
         high = max(-low, high)
@@ -148,9 +149,7 @@ def _curvature(
         for g, good in zip(means, inside, strict=True)
     )
     values = _known(means, disks)
-    return [
-        Scalar(name, _LABELS[name], kind, (low, high), values, rgb) for name in ("curvature", "surface")
-    ]
+    return [Scalar(name, _LABELS[name], kind, (low, high), values, rgb) for name in ("curvature", "surface")]
 
 
 def _limits(values: Sequence[Floats], inside: Sequence[Bools]) -> tuple[float, float]:

@@ -55,25 +55,42 @@ function ends(values, segments, width, Kind) {
   return out;
 }
 
-/** A frame ready to be drawn and read, from its unpacked bytes. */
-function frameFrom(buffer, facts) {
-  const raw = {};
-  for (const [name, kind, start, length] of facts.layout) raw[name] = new KINDS[kind](buffer, start, length);
-  const segments = summed(raw.segments, 2), ids = raw.ids;
-  const frame = {
-    facts, ids,
-    count: facts.bubbles,
-    points: raw.points, normals: raw.normals, owner: new Uint32Array(summed(raw.owner, 1)),
+/** Points, triangles and line pieces of one degree of detail. */
+function meshFrom(raw) {
+  const segments = summed(raw.segments, 2);
+  return {
+    points: raw.points,
+    normals: raw.normals,
+    owner: new Uint32Array(summed(raw.owner, 1)),
     triangles: woven(summed(raw.triangles, 3), 3, Uint32Array),
     linePoints: ends(raw.line_points, segments, 4, Uint16Array),
     lineNormals: ends(raw.line_normals, segments, 4, Int8Array),
     beside: woven(summed(raw.beside, 2), 2, Int32Array),
+  };
+}
+
+/** A frame ready to be drawn and read, from its unpacked bytes. */
+function frameFrom(buffer, facts) {
+  const raw = {}, parts = Array.from({ length: facts.meshes }, () => ({}));
+  for (const [name, kind, start, length] of facts.layout) {
+    const array = new KINDS[kind](buffer, start, length), [mesh, part] = name.split(":");
+    if (mesh.startsWith("mesh")) parts[Number(mesh.slice(4))][part] = array;
+    else raw[name] = array;
+  }
+  const frame = {
+    facts,
+    ids: raw.ids,
+    count: facts.bubbles,
+    meshes: parts.map(meshFrom), // finest first
     neighbours: neighboursOf(summed(raw.pairs, 2), facts.bubbles),
-    euler: raw.euler, targets: raw.targets, centres: raw.centres, facing: raw.facing,
-    values: { id: ids, surface: raw["value:curvature"] },
+    euler: raw.euler,
+    targets: raw.targets,
+    centres: raw.centres,
+    facing: raw.facing,
+    values: { id: raw.ids, surface: raw["value:curvature"] },
     rgb: { surface: raw["rgb:curvature"] },
-    placeOf: new Map(Array.from(ids, (id, place) => [id, place])),
-    bytes: buffer.byteLength,
+    placeOf: new Map(Array.from(raw.ids, (id, place) => [id, place])),
+    bytes: 2 * buffer.byteLength, // with the arrays made of them, about
   };
   for (const name of Object.keys(raw)) {
     const [what, scalar] = name.split(":");

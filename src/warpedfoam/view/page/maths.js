@@ -38,7 +38,7 @@ const eyeDistance = (radius) => (1.04 * radius) / Math.sin(FIELD / 2);
 function lens(camera, width, height) {
   const half = Math.tan(FIELD / 2) / camera.zoom, narrow = Math.min(width, height);
   const eye = along(camera.target, eyeDistance(camera.radius), camera.axes[2]);
-  const depth = dot(along(eye, -1, camera.centre), camera.axes[2]), ball = 1.1 * camera.radius;
+  const depth = dot(along(eye, -1, camera.centre), camera.axes[2]), ball = 1.15 * camera.radius;
   return {
     eye,
     across: (half * width) / narrow,

@@ -1,4 +1,5 @@
 // WebGL: patches as triangles, films as quads of constant width, bubbles' numbers for picking.
+const SMALL = 44; // dots across a bubble, below which a coarser mesh looks the same
 
 /** Colours of 256 places along a colour bar. */
 function rampTexels(stops) {
@@ -23,6 +24,7 @@ class Painter {
     this.bubbles = this.texture(gl.NEAREST);
     this.ramp = this.texture(gl.LINEAR);
     this.buffers = [];
+    this.meshes = [];
     this.picking = null;
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
@@ -78,28 +80,38 @@ class Painter {
     const gl = this.gl;
     for (const buffer of this.buffers) gl.deleteBuffer(buffer);
     this.buffers = [];
-    for (const array of [this.patchArray, this.lineArray]) if (array) gl.deleteVertexArray(array);
+    for (const mesh of this.meshes) [mesh.patches, mesh.lines].forEach((array) => gl.deleteVertexArray(array));
     this.frame = frame;
-    this.patchArray = gl.createVertexArray();
-    gl.bindVertexArray(this.patchArray);
-    this.buffer(frame.points);
+    this.meshes = frame.meshes.map((mesh) => this.uploaded(mesh));
+  }
+
+  uploaded(mesh) {
+    const gl = this.gl, patches = gl.createVertexArray(), lines = gl.createVertexArray();
+    gl.bindVertexArray(patches);
+    this.buffer(mesh.points);
     this.attribute(0, 4, gl.UNSIGNED_SHORT);
-    this.buffer(frame.normals);
+    this.buffer(mesh.normals);
     this.attribute(1, 4, gl.BYTE);
-    this.buffer(frame.owner);
+    this.buffer(mesh.owner);
     this.attribute(2, 1, gl.UNSIGNED_INT);
-    this.buffer(frame.triangles, gl.ELEMENT_ARRAY_BUFFER);
-    this.lineArray = gl.createVertexArray();
-    gl.bindVertexArray(this.lineArray);
-    this.buffer(frame.linePoints);
+    this.buffer(mesh.triangles, gl.ELEMENT_ARRAY_BUFFER);
+    gl.bindVertexArray(lines);
+    this.buffer(mesh.linePoints);
     this.attribute(0, 4, gl.UNSIGNED_SHORT, 16, 0, 1);
     this.attribute(1, 4, gl.UNSIGNED_SHORT, 16, 8, 1);
-    this.buffer(frame.lineNormals);
+    this.buffer(mesh.lineNormals);
     this.attribute(2, 4, gl.BYTE, 8, 0, 1);
     this.attribute(3, 4, gl.BYTE, 8, 4, 1);
-    this.buffer(frame.beside);
+    this.buffer(mesh.beside);
     this.attribute(4, 2, gl.INT, 0, 0, 1);
     gl.bindVertexArray(null);
+    return { patches, lines, corners: mesh.triangles.length, pieces: mesh.beside.length / 2 };
+  }
+
+  /** The finest mesh, or the coarsest where bubbles are small in the window. */
+  mesh(camera) {
+    const { width, height } = this.canvas, small = this.frame.facts.size / pixelSize(camera, width, height) < SMALL;
+    return this.meshes[small ? this.meshes.length - 1 : 0];
   }
 
   /** Colours (n × 3 bytes) and flags (n bytes) of the bubbles. */
@@ -149,8 +161,12 @@ class Painter {
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, this.ramp);
     gl.uniform1i(u.ramp, 1);
-    gl.bindVertexArray(this.patchArray);
-    gl.drawElements(gl.TRIANGLES, this.frame.triangles.length, gl.UNSIGNED_INT, 0);
+    const mesh = this.mesh(camera);
+    gl.bindVertexArray(mesh.patches);
+    // of a closed surface no back is seen
+    if (!this.frame.facts.edged) gl.enable(gl.CULL_FACE);
+    gl.drawElements(gl.TRIANGLES, mesh.corners, gl.UNSIGNED_INT, 0);
+    gl.disable(gl.CULL_FACE);
   }
 
   lines(camera, look) {
@@ -165,9 +181,10 @@ class Painter {
     gl.uniform1i(u.charged, look.charged);
     gl.uniform3fv(u.film, look.film);
     gl.uniform3fv(u.accent, look.accent);
-    gl.bindVertexArray(this.lineArray);
+    const mesh = this.mesh(camera);
+    gl.bindVertexArray(mesh.lines);
     gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.frame.beside.length / 2);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, mesh.pieces);
     gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE);
   }
 

@@ -97,7 +97,7 @@ void main() {
     colour = u_accent; width = max(width, u_dots) + 0.4 * u_dots; pull *= 2.0; shown = true;
   }
   // lines on the far side of a closed surface are behind it
-  bool away = dot(a_tail_normal.xyz, u_eye - a) < 0.0 && dot(a_head_normal.xyz, u_eye - b) < 0.0;
+  bool away = dot(a_tail_normal.xyz, normalize(u_eye - a)) + dot(a_head_normal.xyz, normalize(u_eye - b)) < 0.05;
   if (!shown || (!u_edged && away)) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
   // towards the eye: nearer, but in the same place of the picture
   a += pull * normalize(u_eye - a);

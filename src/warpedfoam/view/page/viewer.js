@@ -51,16 +51,15 @@ class Viewer {
   }
 
   redraw() {
-    this.pending ??= requestAnimationFrame((now) => this.drawn(now));
+    this.pending ??= requestAnimationFrame(() => this.drawn());
   }
 
-  drawn(now) {
+  drawn() {
     this.pending = null;
     const { clientWidth, clientHeight } = this.canvas;
     this.painter.resize(clientWidth, clientHeight, this.dots);
     this.painter.draw(this.camera, this.look);
     this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
-    this.lastDraw = now;
   }
 
   /** While the picture moves: fewer dots if frames come too slowly. */
@@ -95,6 +94,7 @@ class Viewer {
 
   colourBy(name) {
     this.scalar = this.facts.scalars.find((item) => item.name === name);
+    byId("color-by").value = name;
     this.coloured();
     this.redraw();
   }
@@ -247,10 +247,11 @@ class Viewer {
 
 /** Radius of the ball about a centre that holds a frame's points. */
 function ballRadius(frame, cube, centre) {
+  const { points } = frame.meshes[0];
   let most = 0;
-  for (let k = 0; k < frame.points.length; k += 4) {
+  for (let k = 0; k < points.length; k += 4) {
     let square = 0;
-    for (let c = 0; c < 3; c++) square += (cube.low[c] + (cube.side * frame.points[k + c]) / 65535 - centre[c]) ** 2;
+    for (let c = 0; c < 3; c++) square += (cube.low[c] + (cube.side * points[k + c]) / 65535 - centre[c]) ** 2;
     if (square > most) most = square;
   }
   return Math.sqrt(most);
