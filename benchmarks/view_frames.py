@@ -16,10 +16,10 @@ import time
 from pathlib import Path
 
 import numpy as np
-
-import warpedfoam as wf
 from tests.browser import Browser
 from tests.io_foams import sphere_foam
+
+import warpedfoam as wf
 
 TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 

@@ -67,7 +67,8 @@ def where(browser, point):
 def numbers(browser):
     """The table of the picked bubble: caption, and rows by name."""
     code = """[document.querySelector('#numbers caption')?.textContent ?? null,
-      Object.fromEntries([...document.querySelectorAll('#numbers td')].map((c) => [c.dataset.name, c.textContent]))]"""
+      Object.fromEntries(
+        [...document.querySelectorAll('#numbers td')].map((c) => [c.dataset.name, c.textContent]))]"""
     return browser.ask(code)
 
 
@@ -227,7 +228,7 @@ def test_colours_films_and_defects(browser, tmp_path):
     alike = {"area": "volume", "curvature": "surface"}
     for k, name in enumerate(options):
         for j in range(k):
-            same = bool((pictures[j] == pictures[k]).all())
+            same = np.abs(pictures[j] - pictures[k]).max() <= 2  # the surface's is read off a ramp of bytes
             assert same == (alike.get(options[j]) == name), (options[j], name)
     browser.ask("foamViewer.colourBy('pressure')")
     ends = browser.ask("[...document.querySelectorAll('.ends span')].map((s) => s.textContent)")

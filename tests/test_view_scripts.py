@@ -48,7 +48,8 @@ def test_frames_are_unpacked_as_python_packed_them(tmp_path):
     new Frames(facts, () => text).get(0).then((frame) => tell({{
       pressure: [...frame.values.pressure], ids: [...frame.ids], neighbours: frame.neighbours,
       meshes: frame.meshes.map((m) => ({{
-        triangles: [...m.triangles], owner: [...m.owner], beside: [...m.beside], lines: [...m.linePoints] }})),
+        triangles: [...m.triangles],
+        owner: [...m.owner], beside: [...m.beside], lines: [...m.linePoints], quads: [...m.quads] }})),
     }}));
     """
     (told,) = run(code, "frames.js")
@@ -63,9 +64,14 @@ def test_frames_are_unpacked_as_python_packed_them(tmp_path):
     for k, mesh in enumerate(told["meshes"]):
         np.testing.assert_array_equal(np.reshape(mesh["triangles"], (-1, 3)), arrays[f"mesh{k}:triangles"])
         np.testing.assert_array_equal(mesh["owner"], arrays[f"mesh{k}:owner"])
-        np.testing.assert_array_equal(np.reshape(mesh["beside"], (-1, 2)), arrays[f"mesh{k}:beside"])
+        np.testing.assert_array_equal(np.reshape(mesh["beside"], (-1, 2))[::4], arrays[f"mesh{k}:beside"])
         low, side = np.array(facts["cube"]["low"]), facts["cube"]["side"]
-        ends = low + side * np.reshape(mesh["lines"], (-1, 2, 4))[..., :3] / 65535.0
+        ends = low + side * np.reshape(mesh["lines"], (-1, 4, 2, 4))[..., :3] / 65535.0
+        assert np.ptp(ends, axis=1).max() == 0.0  # the same at all corners of a quad
+        ends = ends[:, 0]
+        corners = np.reshape(mesh["quads"], (-1, 6))
+        assert (np.sort(np.unique(corners)) == np.arange(4 * len(ends))).all()
+        assert (corners // 4 == np.arange(len(ends))[:, None]).all()
         np.testing.assert_allclose(
             ends, arrays[f"mesh{k}:line_points"][arrays[f"mesh{k}:segments"]], atol=1e-12
         )
@@ -97,7 +103,8 @@ def test_points_land_where_a_pinhole_puts_them():
     const camera = {camera(zoom=zoom, target=target)}, points = {points.tolist()};
     const m = clipMatrix(camera, {width}, {height});
     tell(points.map((p) => projected(camera, {width}, {height}, p)));
-    tell(points.map((p) => [0, 1, 2, 3].map((r) => m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r])));
+    const clip = (p, r) => m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r];
+    tell(points.map((p) => [0, 1, 2, 3].map((r) => clip(p, r))));
     tell(pixelSize(camera, {width}, {height}));
     """
     places, clips, pixel = run(code, "maths.js")
@@ -124,8 +131,8 @@ def test_points_land_where_a_pinhole_puts_them():
 
 
 def test_a_drag_takes_the_near_side_along():
-    code = f"""
-    const camera = new Camera([0, 0, 0], 2, {{ elevation: 25, azimuth: -60 }});
+    code = """
+    const camera = new Camera([0, 0, 0], 2, { elevation: 25, azimuth: -60 });
     const w = 900, h = 700, near = camera.axes[2].map((x) => 2 * x);
     const before = projected(camera, w, h, near);
     camera.turn(12, 7, w, h);

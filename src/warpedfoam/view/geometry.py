@@ -57,10 +57,10 @@ def detail(n_bubbles: int, n_frames: int = 1) -> tuple[int, int]:
     Examples
     --------
     >>> detail(12), detail(200), detail(2000)
-    ((24, 10), (12, 6), (5, 3))
+    ((24, 10), (8, 4), (4, 2))
     """
     count = n_bubbles * np.sqrt(n_frames)
-    for most, segments, rings in ((20, 24, 10), (300, 12, 6), (1000, 8, 4), (4000, 5, 3)):
+    for most, segments, rings in ((20, 24, 10), (100, 12, 6), (300, 8, 4), (1000, 6, 3)):
         if count <= most:
             return segments, rings
     return 4, 2

@@ -43,6 +43,15 @@ function neighboursOf(pairs, count) {
   return out.map((set) => [...set]);
 }
 
+/** Rows of numbers, each four times: one for every corner of the quad that is drawn of a line piece. */
+function fourfold(rows, width, Kind) {
+  const n = rows.length / width, out = new Kind(4 * rows.length);
+  for (let k = 0; k < n; k++) {
+    for (let j = 0; j < 4; j++) for (let c = 0; c < width; c++) out[(4 * k + j) * width + c] = rows[k * width + c];
+  }
+  return out;
+}
+
 /** The two ends of each line piece, one row of numbers a piece. */
 function ends(values, segments, width, Kind) {
   const n = segments.length / 2, out = new Kind(2 * width * n);
@@ -55,6 +64,13 @@ function ends(values, segments, width, Kind) {
   return out;
 }
 
+/** Corners of two triangles for each of so many quads. */
+function quads(count) {
+  const out = new Uint32Array(6 * count), corners = [0, 1, 2, 2, 1, 3];
+  for (let k = 0; k < out.length; k++) out[k] = 4 * Math.floor(k / 6) + corners[k % 6];
+  return out;
+}
+
 /** Points, triangles and line pieces of one degree of detail. */
 function meshFrom(raw) {
   const segments = summed(raw.segments, 2);
@@ -63,9 +79,10 @@ function meshFrom(raw) {
     normals: raw.normals,
     owner: new Uint32Array(summed(raw.owner, 1)),
     triangles: woven(summed(raw.triangles, 3), 3, Uint32Array),
-    linePoints: ends(raw.line_points, segments, 4, Uint16Array),
-    lineNormals: ends(raw.line_normals, segments, 4, Int8Array),
-    beside: woven(summed(raw.beside, 2), 2, Int32Array),
+    linePoints: fourfold(ends(raw.line_points, segments, 4, Uint16Array), 8, Uint16Array),
+    lineNormals: fourfold(ends(raw.line_normals, segments, 4, Int8Array), 8, Int8Array),
+    beside: fourfold(woven(summed(raw.beside, 2), 2, Int32Array), 2, Int32Array),
+    quads: quads(segments.length / 2),
   };
 }
 
@@ -90,7 +107,7 @@ function frameFrom(buffer, facts) {
     values: { id: raw.ids, surface: raw["value:curvature"] },
     rgb: { surface: raw["rgb:curvature"] },
     placeOf: new Map(Array.from(raw.ids, (id, place) => [id, place])),
-    bytes: 2 * buffer.byteLength, // with the arrays made of them, about
+    bytes: 4 * buffer.byteLength, // with the arrays made of them, about
   };
   for (const name of Object.keys(raw)) {
     const [what, scalar] = name.split(":");

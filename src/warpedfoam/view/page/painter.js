@@ -67,12 +67,11 @@ class Painter {
     return buffer;
   }
 
-  attribute(place, size, type, stride = 0, offset = 0, each = 0) {
+  attribute(place, size, type, stride = 0, offset = 0) {
     const gl = this.gl, whole = type === gl.INT || type === gl.UNSIGNED_INT;
     gl.enableVertexAttribArray(place);
     if (whole) gl.vertexAttribIPointer(place, size, type, stride, offset);
     else gl.vertexAttribPointer(place, size, type, true, stride, offset);
-    gl.vertexAttribDivisor(place, each);
   }
 
   /** Bring a frame's points to the graphics card, in place of the last one's. */
@@ -97,15 +96,16 @@ class Painter {
     this.buffer(mesh.triangles, gl.ELEMENT_ARRAY_BUFFER);
     gl.bindVertexArray(lines);
     this.buffer(mesh.linePoints);
-    this.attribute(0, 4, gl.UNSIGNED_SHORT, 16, 0, 1);
-    this.attribute(1, 4, gl.UNSIGNED_SHORT, 16, 8, 1);
+    this.attribute(0, 4, gl.UNSIGNED_SHORT, 16, 0);
+    this.attribute(1, 4, gl.UNSIGNED_SHORT, 16, 8);
     this.buffer(mesh.lineNormals);
-    this.attribute(2, 4, gl.BYTE, 8, 0, 1);
-    this.attribute(3, 4, gl.BYTE, 8, 4, 1);
+    this.attribute(2, 4, gl.BYTE, 8, 0);
+    this.attribute(3, 4, gl.BYTE, 8, 4);
     this.buffer(mesh.beside);
-    this.attribute(4, 2, gl.INT, 0, 0, 1);
+    this.attribute(4, 2, gl.INT);
+    this.buffer(mesh.quads, gl.ELEMENT_ARRAY_BUFFER);
     gl.bindVertexArray(null);
-    return { patches, lines, corners: mesh.triangles.length, pieces: mesh.beside.length / 2 };
+    return { patches, lines, corners: mesh.triangles.length, ends: mesh.quads.length };
   }
 
   /** The finest mesh, or the coarsest where bubbles are small in the window. */
@@ -184,7 +184,7 @@ class Painter {
     const mesh = this.mesh(camera);
     gl.bindVertexArray(mesh.lines);
     gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, mesh.pieces);
+    gl.drawElements(gl.TRIANGLES, mesh.ends, gl.UNSIGNED_INT, 0);
     gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE);
   }
 

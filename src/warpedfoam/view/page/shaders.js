@@ -107,7 +107,7 @@ void main() {
   float len = length(pb - pa);
   vec2 ahead = len > 1e-4 ? (pb - pa) / len : vec2(1.0, 0.0), aside = vec2(-ahead.y, ahead.x);
   float radius = 0.5 * max(width, 1.0), reach = radius + 1.0;
-  bool end = gl_VertexID > 1;
+  bool end = (gl_VertexID & 2) != 0;
   float side = (gl_VertexID & 1) == 0 ? -1.0 : 1.0;
   vec4 c = end ? cb : ca;
   vec2 p = (end ? pb + reach * ahead : pa - reach * ahead) + side * reach * aside;
