@@ -118,6 +118,7 @@ from warpedfoam.tessellate import (
     geodesic_report,
     voronoi_foam,
 )
+from warpedfoam.view import write_view
 
 __version__ = "0.1.0"
 
@@ -216,6 +217,7 @@ __all__ = [
     "write_potential_csv",
     "write_pvd",
     "write_record",
+    "write_view",
     "write_vtm",
     "write_vtp",
 ]

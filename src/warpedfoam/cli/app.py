@@ -317,6 +317,38 @@ def info(file: FoamFile, frame: Frame = -1, as_json: Json = False, debug: Debug 
         print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
 
 
+@app.command()
+def view(
+    files: Annotated[
+        list[str],
+        typer.Argument(help="Saved foams (foam.npz); several make a trajectory.", metavar="FOAM.NPZ..."),
+    ],
+    out: Annotated[
+        str | None, typer.Option("-o", "--out", help="HTML file; beside the first foam if left out.")
+    ] = None,
+    color_by: Annotated[
+        str,
+        typer.Option(
+            help="Show first: charge, sides, area, volume, pressure, curvature (of bubbles), surface "
+            "(curvature, point by point) or id."
+        ),
+    ] = "charge",
+    title: Annotated[str | None, typer.Option("--title", help="Heading of the page.")] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write one HTML file that shows a foam in 3D in any browser, without a network."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.viewing import view_files
+
+        path, facts = view_files(files, out=out, color_by=color_by, title=title)
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser", flush=True)
+
+
 def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
     foam = {name: given[name] for name in ("n_bubbles", "seeds", "cells", "lloyd")}

@@ -1,0 +1,300 @@
+// The page: state, drawing when something has changed, and the controls.
+const SLOW = 45; // milliseconds between frames of a movement, above which they are drawn coarser
+
+class Viewer {
+  constructor(facts) {
+    this.facts = facts;
+    this.canvas = byId("scene");
+    this.painter = new Painter(this.canvas);
+    this.frames = new Frames(facts, (number) => byId(`frame-${number}`).textContent);
+    const { low, side } = facts.cube;
+    this.camera = new Camera(low.map((x) => x + side / 2), side / 2, facts.view);
+    this.number = 0;
+    this.pickedId = null;
+    this.coarse = 1;
+    this.moved = 0;
+    this.scalar = facts.scalars.find((item) => item.name === facts.colorBy);
+  }
+
+  async start() {
+    this.frame = await this.frames.get(0);
+    this.camera.radius = ballRadius(this.frame, this.facts.cube, this.camera.centre);
+    this.controls();
+    this.themed(matchMedia("(prefers-color-scheme: dark)").matches);
+    this.painter.setFrame(this.frame);
+    this.coloured();
+    this.told();
+    new ResizeObserver(() => this.redraw()).observe(this.canvas);
+    this.redraw();
+  }
+
+  // ------------------------------------------------------------------ drawing
+
+  get look() {
+    const hex = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16) / 255);
+    const { dark } = this;
+    return {
+      cube: this.facts.cube,
+      mode: this.scalar.name === "surface" ? 1 : 0,
+      films: byId("films").checked,
+      charged: byId("charged").checked,
+      film: hex(this.facts.colours.film),
+      // on patches, which are as bright in the dark
+      accent: hex("#d4009f"),
+      ground: hex(dark ? "#17181c" : "#ffffff"),
+      dots: this.dots,
+    };
+  }
+
+  get dots() {
+    return Math.min(window.devicePixelRatio || 1, 3) * this.coarse;
+  }
+
+  redraw() {
+    this.pending ??= requestAnimationFrame(() => this.drawn());
+  }
+
+  drawn() {
+    this.pending = null;
+    const { clientWidth, clientHeight } = this.canvas;
+    this.painter.resize(clientWidth, clientHeight, this.dots);
+    this.painter.draw(this.camera, this.look);
+    this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
+  }
+
+  /** While the picture moves: fewer dots if frames come too slowly. */
+  moving() {
+    const now = performance.now(), pause = now - this.moved;
+    this.moved = now;
+    if (pause < 400) {
+      this.pace = 0.7 * (this.pace ?? pause) + 0.3 * pause;
+      if (this.pace > SLOW && this.coarse > 0.4) { this.coarse = Math.max(0.4, 0.8 * this.coarse); this.pace = SLOW; }
+    } else this.pace = undefined;
+    this.redraw();
+  }
+
+  settled() {
+    if (this.coarse !== 1) { this.coarse = 1; this.redraw(); }
+  }
+
+  // ------------------------------------------------------------------ state
+
+  async show(number) {
+    const wanted = Math.min(Math.max(number, 0), this.facts.frames.length - 1);
+    this.wanted = wanted;
+    const frame = await this.frames.get(wanted);
+    if (this.wanted !== wanted) return; // another one was asked for meanwhile
+    this.number = wanted;
+    this.frame = frame;
+    this.painter.setFrame(frame);
+    this.coloured();
+    this.told();
+    this.redraw();
+  }
+
+  colourBy(name) {
+    this.scalar = this.facts.scalars.find((item) => item.name === name);
+    byId("color-by").value = name;
+    this.coloured();
+    this.redraw();
+  }
+
+  get place() {
+    return this.pickedId === null ? -1 : this.frame.placeOf.get(this.pickedId) ?? -1;
+  }
+
+  coloured() {
+    const { frame, scalar, place } = this, flags = new Uint8Array(frame.count);
+    for (let k = 0; k < frame.count; k++) if (frame.values.charge[k] !== 0) flags[k] |= CHARGED;
+    if (place >= 0) {
+      flags[place] |= PICKED;
+      for (const k of frame.neighbours[place]) flags[k] |= NEIGHBOUR;
+    }
+    this.painter.setRamp(scalar.stops);
+    this.painter.setBubbles(frame.rgb[scalar.name], flags);
+    const outside = [1, 3, 5].map((k) => parseInt(this.facts.colours.outside.slice(k, k + 2), 16));
+    byId("legend").replaceChildren(...legend(scalar, frame, outside));
+  }
+
+  told() {
+    const { frame, place, facts, number } = this, about = frame.facts;
+    byId("frame-facts").textContent =
+      `${about.bubbles} bubbles, energy ${written(about.energy)}, gap ${written(about.gap)}`;
+    byId("frame").value = number;
+    byId("frame").setAttribute("aria-valuetext", about.label);
+    byId("frame-label").textContent = `${about.label} (${number + 1}/${facts.frames.length})`;
+    byId("unpick").hidden = this.pickedId === null;
+    if (this.pickedId !== null) byId("find-id").value = String(this.pickedId);
+    const gone = element("p", { class: "hint" }, `There is no bubble ${this.pickedId} in this frame.`);
+    const hint = element("p", { class: "hint" }, "Tap a bubble to read its numbers.");
+    const go = (id) => this.goTo(id);
+    byId("numbers").replaceChildren(
+      ...(place >= 0 ? numbers(frame, place, go) : [this.pickedId === null ? hint : gone]));
+  }
+
+  picked(id) {
+    this.pickedId = id;
+    if (id === null) byId("find-id").value = "";
+    this.coloured();
+    this.told();
+    this.redraw();
+  }
+
+  /** Pick a bubble by its id and turn it to the front. */
+  goTo(id) {
+    const place = this.frame.placeOf.get(id) ?? -1, { centres, facing: normals } = this.frame;
+    if (place >= 0) this.camera.faceTo([...centres.slice(3 * place, 3 * place + 3)], [...normals.slice(3 * place, 3 * place + 3)]);
+    this.picked(id);
+  }
+
+  /** Id of the bubble at a place of the window, in its pixels, or null. */
+  at(x, y) {
+    const box = this.canvas.getBoundingClientRect();
+    const place = this.painter.pick(this.camera, this.look, (x - box.left) / box.width, (y - box.top) / box.height);
+    return place < 0 ? null : this.frame.ids[place];
+  }
+
+  themed(dark) {
+    this.dark = dark;
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    this.redraw();
+  }
+
+  // ------------------------------------------------------------------ controls
+
+  controls() {
+    const { facts, canvas } = this, select = byId("color-by");
+    for (const { name, label } of facts.scalars) select.append(element("option", { value: name }, label));
+    select.value = this.scalar.name;
+    select.addEventListener("change", () => this.colourBy(select.value));
+    for (const id of ["films", "charged"]) byId(id).addEventListener("change", () => this.redraw());
+    byId("find").addEventListener("submit", (event) => {
+      event.preventDefault();
+      const text = byId("find-id").value.trim();
+      if (/^\d+$/.test(text)) this.goTo(Number(text));
+    });
+    byId("unpick").addEventListener("click", () => this.picked(null));
+    byId("home").addEventListener("click", () => this.home());
+    byId("theme").addEventListener("click", () => this.themed(!this.dark));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (event) => this.themed(event.matches));
+    const full = byId("fullscreen");
+    full.hidden = !document.fullscreenEnabled;
+    full.addEventListener("click", () => this.fullscreen());
+    listen(canvas, this.camera, {
+      changed: () => this.moving(),
+      ended: () => this.settled(),
+      tapped: (x, y) => { this.settled(); this.picked(this.at(x, y)); },
+    });
+    document.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.painter = new Painter(canvas);
+      this.painter.setFrame(this.frame);
+      this.coloured();
+      this.redraw();
+    });
+    if (facts.frames.length > 1) this.player();
+  }
+
+  home() {
+    this.camera.home();
+    this.redraw();
+  }
+
+  fullscreen() {
+    if (document.fullscreenElement) document.exitFullscreen();
+    else document.documentElement.requestFullscreen?.().catch(() => {});
+  }
+
+  key(event) {
+    const busy = event.target.closest("input, select, button, textarea");
+    if (event.altKey || event.metaKey || event.ctrlKey) return;
+    if (event.key === "Escape" && this.pickedId !== null) this.picked(null);
+    else if (busy) return;
+    else if (event.key === "Home") this.home();
+    else if (event.key === "f" || event.key === "F") this.fullscreen();
+    else if (event.key === " " && this.facts.frames.length > 1) this.play(!this.playing);
+    else return;
+    event.preventDefault();
+  }
+
+  player() {
+    byId("player").hidden = false;
+    const slider = byId("frame");
+    slider.max = this.facts.frames.length - 1;
+    slider.addEventListener("input", () => { this.play(false); this.show(Number(slider.value)); });
+    byId("play").addEventListener("click", () => this.play(!this.playing));
+  }
+
+  play(on) {
+    this.playing = on;
+    clearTimeout(this.timer);
+    byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
+    byId("play-shape").setAttribute("d", on ? "M7 5.5h3.5v13H7zM13.5 5.5H17v13h-3.5z" : "M8 5.5v13l11-6.5z");
+    if (!on) return;
+    const last = this.facts.frames.length - 1;
+    const step = async (number) => {
+      const began = performance.now();
+      await this.show(number);
+      if (!this.playing) return;
+      if (number >= last) return this.play(false);
+      const rest = 1000 / Number(byId("speed").value) - (performance.now() - began);
+      this.timer = setTimeout(() => step(number + 1), Math.max(rest, 0));
+    };
+    step(this.number >= last ? 0 : this.number + 1);
+  }
+}
+
+/** Radius of the ball about a centre that holds a frame's points. */
+function ballRadius(frame, cube, centre) {
+  const { points } = frame.meshes[0];
+  let most = 0;
+  for (let k = 0; k < points.length; k += 4) {
+    let square = 0;
+    for (let c = 0; c < 3; c++) square += (cube.low[c] + (cube.side * points[k + c]) / 65535 - centre[c]) ** 2;
+    if (square > most) most = square;
+  }
+  return Math.sqrt(most);
+}
+
+/** Say what went wrong where the picture would be. */
+function failed(fault) {
+  const message = byId("message");
+  message.textContent = fault.message;
+  message.hidden = false;
+  throw fault;
+}
+
+async function begin() {
+  if (typeof DecompressionStream === "undefined") throw new Error("This browser is too old: the viewer needs one of 2023 or later.");
+  const viewer = new Viewer(JSON.parse(byId("facts").textContent));
+  await viewer.start();
+  return viewer;
+}
+
+/** For scripts of your own: wait for `ready`, then call these. */
+const ready = begin().catch(failed);
+window.foamViewer = {
+  ready: ready.then(() => true),
+  show: async (number) => (await ready).show(number),
+  pick: async (id) => (await ready).goTo(id),
+  colourBy: async (name) => (await ready).colourBy(name),
+  /** Where a point of space is in the window, in its pixels. */
+  where: async (point) => {
+    const { camera, canvas } = await ready, box = canvas.getBoundingClientRect();
+    const at = projected(camera, box.width, box.height, point);
+    return at && [at[0] + box.left, at[1] + box.top];
+  },
+  /** Milliseconds each of `count` pictures takes, turning a little between them. */
+  time: async (count) => {
+    const { camera, canvas, painter, look } = await ready, out = [];
+    for (let k = 0; k < count; k++) {
+      camera.turn(6, 2, canvas.clientWidth, canvas.clientHeight);
+      const began = performance.now();
+      painter.draw(camera, look);
+      painter.finish();
+      out.push(performance.now() - began);
+    }
+    return out;
+  },
+};
