@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import warpedfoam as wf
-from warpedfoam.cli.sizes import SIZES
+from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import Layer
 
 ROOT = Path(__file__).parents[1]

@@ -66,7 +66,7 @@ from warpedfoam.plot import (
     save_picture,
 )
 from warpedfoam.relax import Relaxation, relax
-from warpedfoam.studies import GeodesicCircle, geodesic_circle
+from warpedfoam.studies import Ensemble, GeodesicCircle, Study, geodesic_circle, read_study, run_ensemble
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
@@ -106,6 +106,7 @@ __all__ = [
     "Cylinder",
     "DefectReport",
     "Ellipsoid",
+    "Ensemble",
     "EquilibriumReport",
     "FileFormatError",
     "FlatTorus",
@@ -126,6 +127,7 @@ __all__ = [
     "SchwarzP",
     "SideDistribution",
     "Sphere",
+    "Study",
     "Surface",
     "T1Event",
     "TopologyError",
@@ -154,7 +156,9 @@ __all__ = [
     "plot_order",
     "plot_sides",
     "read_mesh",
+    "read_study",
     "relax",
+    "run_ensemble",
     "save",
     "save_figure",
     "save_picture",

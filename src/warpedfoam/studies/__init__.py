@@ -1,5 +1,7 @@
-"""Studies of one bubble's surroundings and of single bubbles: geodesic circles."""
+"""Studies: geodesic circles round one bubble, and ensembles of foams."""
 
+from warpedfoam.studies.ensemble import Ensemble, run_ensemble
 from warpedfoam.studies.geodesic_circle import GeodesicCircle, geodesic_circle
+from warpedfoam.studies.study import Study, read_study
 
-__all__ = ["GeodesicCircle", "geodesic_circle"]
+__all__ = ["Ensemble", "GeodesicCircle", "Study", "geodesic_circle", "read_study", "run_ensemble"]
