@@ -38,7 +38,7 @@ def ensemble_text(facts: Mapping[str, Any]) -> str:
     each = seconds / max(facts["runs"] - facts["counts"]["lost"], 1)
     lines = [
         f"runs      {facts['runs']}: {counts}; {facts['computed_now']} of them computed now",
-        f"time      {facts['clock_seconds']:.1f} s now; processors {seconds:.1f} s in all, {each:.2f} s a run",
+        f"time      {facts['clock_seconds']:.1f} s now; processors {seconds:.1f} s, {each:.2f} s a run",
         f"table     {facts['columns']} columns",
         f"written   {', '.join(facts['outputs'])}",
     ]
