@@ -168,6 +168,27 @@ def test_what_fails_is_a_row_with_its_reason(tmp_path: Path, monkeypatch: pytest
         done.foam(0)
 
 
+def test_every_member_has_one_blas_thread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    name = user_functions(
+        tmp_path,
+        """
+        from threadpoolctl import threadpool_info
+
+        def threads(foam):
+            return max(p["num_threads"] for p in threadpool_info() if p["user_api"] == "blas")
+        """,
+        monkeypatch,
+    )
+    made = study(repeats=1, grid={}, observables=(f"{name}:threads",))
+    with threadpool_limits(limits=2):
+        before = max(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        done = wf.run_ensemble(made, tmp_path / "out", workers=0)
+    assert before == 2
+    assert done.columns["threads"] == [1]
+
+
 def test_what_does_not_converge_says_so(tmp_path: Path) -> None:
     done = wf.run_ensemble(study(relax={"max_iterations": 1}, repeats=1), tmp_path, workers=0)
     assert done.counts["not_converged"] == 2
