@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import warpedfoam as wf
-from warpedfoam.cli.config import options_from, read_options
+from warpedfoam.studies.options import options_from, read_options
 
 from .bad_calls import SPHERE, TORUS, bad, cell, changed, foam, named, rebuilt, table
 

@@ -17,8 +17,8 @@ from typer.testing import CliRunner, Result
 
 import warpedfoam.io
 from warpedfoam.cli.app import app
-from warpedfoam.cli.config import options_from, read_options
 from warpedfoam.cli.job import run_job
+from warpedfoam.studies.options import options_from, read_options
 
 SMALL = ["--seeds", "lattice", "-n", "16"]
 OUTPUTS = {

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import warpedfoam as wf
-from warpedfoam.cli.sizes import SIZES
+from warpedfoam.studies.observables import COORDINATES, GROUPS, SINGLE
+from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import Layer
 
 ROOT = Path(__file__).parents[1]
@@ -128,6 +129,22 @@ def test_the_theory_page() -> None:
     assert space["measured"].perimeter == pytest.approx(
         space["traced"].perimeter, abs=space["measured"].error
     )
+
+
+def test_the_ensembles_page() -> None:
+    space = run(ROOT / "docs" / "ensembles.md")
+    assert space["ensemble"].counts["converged"] == 8
+    assert len(space["foams"]) == 4
+    assert all(foam.network.charges.sum() == 0 for foam in space["foams"])
+
+
+def test_the_study_of_the_ensembles_page(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "ensembles.md").read_text(encoding="utf-8")
+    (study,) = re.findall(r"^```toml\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    (tmp_path / "study.toml").write_text(study, encoding="utf-8")
+    assert len(wf.read_study(tmp_path / "study.toml").runs) == 2 * 3 * 3 * 20
+    for name in (*SINGLE, *GROUPS, *COORDINATES):
+        assert f"`{name}`" in text
 
 
 def test_the_table_has_every_surface() -> None:

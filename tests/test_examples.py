@@ -7,12 +7,21 @@ the machine, because a T1 more or less leads to another minimum.
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+import warpedfoam as wf
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
+#: Studies: what makes them small, and the charges of every foam by case of the surface.
+STUDIES = {
+    "tori": (["repeats=1"], {"torus": 0}),
+    "polydispersity": (["repeats=1", "foam.n_bubbles=60"], {"sphere": 12, "torus": 0}),
+    "schwarz_p": (["repeats=1"], {"schwarz_p": -24}),
+}
 
 
 def example(name: str) -> ModuleType:
@@ -27,7 +36,9 @@ def example(name: str) -> ModuleType:
 def test_every_example_is_tested() -> None:
     assert {p.stem for p in EXAMPLES.glob("*.py")} == {
         "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply", "04_defects_on_tori",
+        "05_polydispersity_ensemble",
     }  # fmt: skip
+    assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
 
 def test_first_foam_on_a_torus(tmp_path: Path) -> None:
@@ -62,3 +73,27 @@ def test_defects_on_tori(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         "charge_1.5.png", "charge_3.png", "charge_6.png", "defects.png",
     }  # fmt: skip
     assert len(capsys.readouterr().out.splitlines()) == 7
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_study_runs(name: str, tmp_path: Path) -> None:
+    overrides, charges = STUDIES[name]
+    study = wf.read_study(EXAMPLES / f"{name}.toml", overrides)
+    if name == "schwarz_p":
+        study = replace(study, grid={"foam.n_bubbles": [150]})
+    done = wf.run_ensemble(study, tmp_path, workers=0)
+    assert done.counts["converged"] == done.n_runs, done.columns["reason"]
+    for run, foam in enumerate(done.foams()):
+        assert foam.network.charges.sum() == charges[done.columns["surface.kind"][run]]
+    energies = done.column("energy_over_honeycomb")
+    assert ((energies > 0.97) & (energies < 1.6)).all()
+
+
+def test_polydispersity_ensemble(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pairs, bad = example("05_polydispersity_ensemble").main(2, 60, tmp_path, workers=0)
+    assert bad == 0
+    # wide distributions of volumes make more charges
+    assert 0.0 < pairs[0] < pairs[-1] < 1.0
+    assert (tmp_path / "polydispersity.png").stat().st_size > 10_000
+    assert (tmp_path / "polydispersity" / "ensemble.parquet").exists()
+    assert len(capsys.readouterr().out.splitlines()) == 6

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 HEAVY = {
     "matplotlib", "trimesh", "igl", "networkx", "rich", "typer", "click", "pyvista", "pypardiso",
-    "scipy.optimize", "scipy.stats", "pandas", "tomllib",
+    "scipy.optimize", "scipy.stats", "pandas", "tomllib", "dask", "distributed", "pyarrow", "threadpoolctl",
 }  # fmt: skip
 
 

@@ -85,12 +85,16 @@ from warpedfoam.plot import (
 from warpedfoam.relax import LayeredRelaxation, Relaxation, relax
 from warpedfoam.studies import (
     BubbleBetweenPlates,
+    Ensemble,
     GeodesicCircle,
     GeometricPotential,
+    Study,
     bubble_between_plates,
     drift_path,
     geodesic_circle,
     geometric_potential,
+    read_study,
+    run_ensemble,
     write_potential_csv,
 )
 from warpedfoam.surfaces import (
@@ -134,6 +138,7 @@ __all__ = [
     "Cylinder",
     "DefectReport",
     "Ellipsoid",
+    "Ensemble",
     "EquilibriumReport",
     "EvolverDump",
     "FileFormatError",
@@ -157,6 +162,7 @@ __all__ = [
     "SchwarzP",
     "SideDistribution",
     "Sphere",
+    "Study",
     "Surface",
     "T1Event",
     "TopologyError",
@@ -193,8 +199,10 @@ __all__ = [
     "plot_sides",
     "read_dmp",
     "read_mesh",
+    "read_study",
     "read_vtp",
     "relax",
+    "run_ensemble",
     "save",
     "save_figure",
     "save_picture",

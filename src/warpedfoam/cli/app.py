@@ -113,7 +113,7 @@ def run(
     """Build and relax the foam that a TOML file describes."""
 
     def options() -> Any:
-        from warpedfoam.cli.config import read_options
+        from warpedfoam.studies.options import read_options
 
         overrides = list(sets or [])
         if out is not None:
@@ -127,7 +127,7 @@ def run(
 
 def _add_surface(kind: str, about: str, helps: Mapping[str, str]) -> None:
     """Add ``foam KIND``: the surface's sizes, then the options that all surfaces share."""
-    from warpedfoam.cli.sizes import SIZES
+    from warpedfoam.studies.sizes import SIZES
 
     sizes = SIZES[kind]
     plain = inspect.Parameter.KEYWORD_ONLY
@@ -349,6 +349,42 @@ def view(
             print(f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser", flush=True)
 
 
+@app.command()
+def ensemble(
+    file: Annotated[str, typer.Argument(help="TOML file of a study.", metavar="STUDY.TOML")],
+    out: Annotated[str, typer.Option("-o", "--out", help="Folder for the results; goes on there.")] = "out",
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Processes on this machine; 0: none but this one.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Use this dask scheduler.")
+    ] = None,
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replace an option, such as repeats=10."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Compute every run of a study into one table; go on where an earlier call ended."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.ensembles import ensemble_text, run_file
+
+        with progress_bars(quiet=quiet) as report:
+            facts = run_file(file, out, sets or [], workers=workers, scheduler=scheduler, progress=report)
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(ensemble_text(facts), flush=True)
+    bad = {state: n for state, n in facts["counts"].items() if n and state != "converged"}
+    if bad:
+        _say(
+            ", ".join(f"{n} of {facts['runs']} runs {state}" for state, n in bad.items()) + "; see the table"
+        )
+        raise typer.Exit(NOT_CONVERGED)
+
+
 def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
     foam = {name: given[name] for name in ("n_bubbles", "seeds", "cells", "lloyd")}
@@ -363,7 +399,7 @@ def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _checked(values: Mapping[str, Any]) -> Any:
-    from warpedfoam.cli.config import options_from
+    from warpedfoam.studies.options import options_from
 
     return options_from(values, "command line")
 

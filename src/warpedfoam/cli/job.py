@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from warpedfoam.cli.config import Options
 from warpedfoam.cli.progress import Progress, silent
 from warpedfoam.foam import Foam
 from warpedfoam.relax.result import Relaxation
+from warpedfoam.studies.options import Options
 
 RECORD = "record.json"
 

@@ -1,10 +1,9 @@
-"""Options of the main job: read from TOML and from ``--set``, each checked by name."""
+"""Options of the main job and of studies: read from TOML and from ``--set``, each checked by name."""
 
 from __future__ import annotations
 
 import difflib
-import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +11,10 @@ from typing import Any, TypeVar
 
 from warpedfoam.arrays import as_choice, as_flag, as_floats, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
-from warpedfoam.cli.sizes import SIZES
 from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
+from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
@@ -200,6 +199,22 @@ def read_options(path: str | Path, overrides: Iterable[str] = ()) -> Options:
     OSError
         If the file cannot be read.
     """
+    values, origins = read_values(path, overrides)
+    return options_from(values, str(path), origins)
+
+
+def read_values(path: str | Path, overrides: Iterable[str] = ()) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return what a TOML file holds, with ``section.name=value`` texts put in, and where those come from.
+
+    Raises
+    ------
+    ValueError
+        Not TOML, or an override that is none.
+    OSError
+        If the file cannot be read.
+    """
+    import tomllib
+
     data = Path(path).read_bytes()
     try:
         values = tomllib.loads(data.decode("utf-8"))
@@ -208,10 +223,16 @@ def read_options(path: str | Path, overrides: Iterable[str] = ()) -> Options:
     origins: dict[str, str] = {}
     for text in overrides:
         _override(values, origins, text)
-    return options_from(values, str(path), origins)
+    return values, origins
 
 
-def options_from(values: Mapping[str, Any], source: str, origins: Mapping[str, str] | None = None) -> Options:
+def options_from(
+    values: Mapping[str, Any],
+    source: str,
+    origins: Mapping[str, str] | None = None,
+    *,
+    build: bool = True,
+) -> Options:
     """Check nested plain values and return them as `Options`.
 
     Parameters
@@ -222,6 +243,8 @@ def options_from(values: Mapping[str, Any], source: str, origins: Mapping[str, s
         Where they come from, for messages.
     origins : mapping of str to str, optional
         Where single options (``"foam.lloyd"``) come from, if elsewhere.
+    build : bool, optional
+        Make the plates too, to see whether their sizes agree.
 
     Raises
     ------
@@ -234,9 +257,9 @@ def options_from(values: Mapping[str, Any], source: str, origins: Mapping[str, s
     Traceback (most recent call last):
     ValueError: foam.toml: unknown option foam.n_bubles; did you mean foam.n_bubbles?
     """
-    places = _Places(source, origins or {})
+    places = Places(source, origins or {})
     surface = _surface(_table(values, "surface", places), places)
-    known = _names(surface.kind)
+    known = option_names(surface.kind)
     for section, content in values.items():
         if section in SECTIONS:
             for name in _table(values, section, places):
@@ -249,37 +272,50 @@ def options_from(values: Mapping[str, Any], source: str, origins: Mapping[str, s
     }
     seed = places.read("seed", values["seed"], _at_least(0)) if "seed" in values else 0
     options = Options(seed=seed, surface=surface, **sections)
-    try:
-        _ = options.plates
-    except (TypeError, ValueError) as fault:
-        raise ValueError(f"{source}: {fault}") from None
+    if build:
+        try:
+            _ = options.plates
+        except (TypeError, ValueError) as fault:
+            raise ValueError(f"{source}: {fault}") from None
     return options
 
 
 @dataclass(frozen=True)
-class _Places:
+class Places:
+    """Where options come from, for messages: a source, and other origins of single options."""
+
     source: str
     origins: Mapping[str, str]
 
     def of(self, name: str) -> str:
+        """Where the option comes from."""
         return self.origins.get(name, self.source)
 
     def read(self, name: str, value: Any, reader: Callable[[Any, str], Any]) -> Any:
+        """Return ``reader(value, name)``; its refusal is a ``ValueError`` that says where."""
         try:
             return reader(value, name)
         except (TypeError, ValueError) as fault:
             raise ValueError(f"{self.of(name)}: {fault}") from None
 
-    def require_known(self, name: str, known: list[str], *, table: bool = False) -> None:
+    def require_known(
+        self,
+        name: str,
+        known: list[str],
+        *,
+        table: bool = False,
+        sections: Sequence[str] = ("surface", *SECTIONS),
+    ) -> None:
+        """Refuse a name that is not known; near matches are named."""
         if name in known:
             return
         kind = "section" if table else "option"
-        raise ValueError(f"{self.of(name)}: unknown {kind} {name}; {_suggestion(name, known, table)}")
+        hint = _suggestion(name, known, sections if table else None)
+        raise ValueError(f"{self.of(name)}: unknown {kind} {name}; {hint}")
 
 
-def _suggestion(name: str, known: list[str], table: bool) -> str:
-    if table:
-        sections = ["surface", *SECTIONS]
+def _suggestion(name: str, known: list[str], sections: Sequence[str] | None) -> str:
+    if sections is not None:
         near = difflib.get_close_matches(name, sections, n=1)
         return f"did you mean {near[0]}?" if near else f"sections are {', '.join(sections)}"
     near = difflib.get_close_matches(name, known, n=2, cutoff=0.75)
@@ -292,26 +328,27 @@ def _suggestion(name: str, known: list[str], table: bool) -> str:
     return "options are " + ", ".join([k for k in known if k.startswith(section)] or known)
 
 
-def _names(kind: str) -> list[str]:
+def option_names(kind: str) -> list[str]:
+    """Dotted names of all options for a kind of surface."""
     names = ["seed", "surface.kind", *(f"surface.{name}" for name in SIZES[kind])]
     for section, options in SECTIONS.items():
         names += [f"{section}.{f.name}" for f in fields(options)]
     return names
 
 
-def _table(values: Mapping[str, Any], section: str, places: _Places) -> Mapping[str, Any]:
+def _table(values: Mapping[str, Any], section: str, places: Places) -> Mapping[str, Any]:
     table = values.get(section, {})
     if not isinstance(table, Mapping):
         raise ValueError(f"{places.of(section)}: {section} must be a section, [{section}], got {table!r}")
     return table
 
 
-def _surface(table: Mapping[str, Any], places: _Places) -> SurfaceOptions:
+def _surface(table: Mapping[str, Any], places: Places) -> SurfaceOptions:
     kind = places.read("surface.kind", table.get("kind", "torus"), _one_of(*SIZES))
     sizes = {}
     for name, value in table.items():
         if name != "kind":
-            places.require_known(f"surface.{name}", _names(kind))
+            places.require_known(f"surface.{name}", option_names(kind))
             reader = _text if isinstance(SIZES[kind][name], str) else _above_zero
             sizes[name] = places.read(f"surface.{name}", value, reader)
     if kind == "mesh" and "file" not in sizes:
@@ -319,7 +356,7 @@ def _surface(table: Mapping[str, Any], places: _Places) -> SurfaceOptions:
     return SurfaceOptions(kind, sizes)
 
 
-def _section(kind: type[Section], section: str, table: Mapping[str, Any], places: _Places) -> Section:
+def _section(kind: type[Section], section: str, table: Mapping[str, Any], places: Places) -> Section:
     read = {f.name: f.metadata["read"] for f in fields(kind)}  # type: ignore[arg-type]
     return kind(
         **{name: places.read(f"{section}.{name}", value, read[name]) for name, value in table.items()}
@@ -328,6 +365,8 @@ def _section(kind: type[Section], section: str, table: Mapping[str, Any], places
 
 def _override(values: dict[str, Any], origins: dict[str, str], text: str) -> None:
     """Put one ``section.name=value`` into the nested values."""
+    import tomllib
+
     name, sign, value = (part.strip() for part in text.partition("="))
     if not sign or not name or not value:
         raise ValueError(f"--set {text}: write it as section.name=value, such as --set foam.n_bubbles=500")
