@@ -136,8 +136,11 @@ def test(arguments):
         ("ruff", [tool("ruff"), "check", "."]),
         ("mypy", [tool("mypy"), "--strict", "src"]),
         ("layers", [tool("lint-imports")]),
-        ("pytest", [PYTHON, "-m", "pytest", *arguments]),
+        # a worker for each core, each with one thread for linear algebra; "-n 0" runs all in one process
+        ("pytest", [PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *arguments]),
     ]
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     failed = []
     for name, command in checks:
         say("--- " + name)
