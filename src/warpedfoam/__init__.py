@@ -22,6 +22,7 @@ from warpedfoam.analysis import (
     DefectReport,
     EquilibriumReport,
     FoamStatistics,
+    PointGroup,
     SideDistribution,
     bond_order,
     charge_energies,
@@ -31,6 +32,7 @@ from warpedfoam.analysis import (
     defects,
     equilibrium_report,
     foam_statistics,
+    point_group,
     side_distribution,
 )
 from warpedfoam.cell import HeleShawCell
@@ -66,7 +68,18 @@ from warpedfoam.plot import (
     save_picture,
 )
 from warpedfoam.relax import Relaxation, relax
-from warpedfoam.studies import GeodesicCircle, geodesic_circle
+from warpedfoam.studies import (
+    Annealing,
+    AnnealingHistory,
+    GeodesicCircle,
+    MinimalPartition,
+    PartitionTry,
+    ThomsonPoints,
+    anneal,
+    geodesic_circle,
+    minimal_partition,
+    thomson_points,
+)
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
@@ -96,6 +109,8 @@ from warpedfoam.tessellate import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "Annealing",
+    "AnnealingHistory",
     "BondOrder",
     "Catenoid",
     "CellNetwork",
@@ -120,6 +135,9 @@ __all__ = [
     "LevelSurface",
     "MeshError",
     "MeshSurface",
+    "MinimalPartition",
+    "PartitionTry",
+    "PointGroup",
     "Relaxation",
     "ResolutionError",
     "Revolution",
@@ -128,10 +146,12 @@ __all__ = [
     "Sphere",
     "Surface",
     "T1Event",
+    "ThomsonPoints",
     "TopologyError",
     "Torus",
     "TriangleMesh",
     "WarpedFoamError",
+    "anneal",
     "bond_order",
     "charge_energies",
     "charge_in",
@@ -145,6 +165,7 @@ __all__ = [
     "geodesic_report",
     "load",
     "mesh_report",
+    "minimal_partition",
     "network_from_loops",
     "plot_charge_energies",
     "plot_charge_profile",
@@ -153,6 +174,7 @@ __all__ = [
     "plot_foam",
     "plot_order",
     "plot_sides",
+    "point_group",
     "read_mesh",
     "relax",
     "save",
@@ -161,6 +183,7 @@ __all__ = [
     "side_distribution",
     "t1",
     "theory",
+    "thomson_points",
     "voronoi_foam",
     "wall_t1",
     "write_bubbles_csv",
