@@ -37,7 +37,7 @@ class AnnealingHistory:
     Attributes
     ----------
     move : (n_steps,) array of str
-        ``"t1"``, ``"pair"`` or ``"shake"``.
+        ``"t1"``, ``"pair"``, ``"glide"`` or ``"shake"``.
     temperature : (n_steps,) array
         In units of γ d ℓ.
     proposed : (n_steps,) array
@@ -117,9 +117,10 @@ def anneal(
     foam : Foam
         Relaxed or not.
     steps : int, optional
-    moves : sequence of {"t1", "pair", "shake"}, optional
+    moves : sequence of {"t1", "pair", "glide", "shake"}, optional
         Drawn with equal chances: a T1 on a random film; two T1s beside each other (moving, making or
-        removing dislocations); a cycle of polydispersity, which shakes the whole foam.
+        removing dislocations); a T1 on a film drawn from those where Σ q² would not rise (dislocations
+        glide or annihilate: what large foams need); a cycle of polydispersity, which shakes the whole foam.
     temperature : float, optional
         Of the first step, in units of γ d ℓ; 0 takes no step uphill.
     cooling : float, optional

@@ -1,4 +1,4 @@
-"""Random moves from one relaxed foam to another: T1s, pairs of T1s, cycles of polydispersity."""
+"""Random moves from one relaxed foam to another: T1s, gliding defects, cycles of polydispersity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from warpedfoam.moves.t1 import allowed, t1_sites
 from warpedfoam.network import CellNetwork
 from warpedfoam.relax import Relaxation, relax
 
-MOVES = ("t1", "pair", "shake")
+MOVES = ("t1", "pair", "glide", "shake")
 #: Tolerance where only the way to the next state is relaxed, and most steps of any relaxation.
 ROUGH, STEPS = 1e-4, 300
 
@@ -26,10 +26,10 @@ def moved(foam: Foam, move: str, rng: np.random.Generator, width: float, order: 
     ----------
     foam : Foam
         Relaxed.
-    move : {"t1", "pair", "shake"}
-        One T1 on a film drawn at random; two, the second beside the first; or a cycle of polydispersity:
-        relax with volumes times log-normal factors of this ``width`` (standard deviation of ln V), then
-        with the old volumes.
+    move : {"t1", "pair", "glide", "shake"}
+        One T1 on a film drawn at random; two, the second beside the first; one on a film where Σ q² would
+        not rise; or a cycle of polydispersity: relax with volumes times log-normal factors of this
+        ``width`` (standard deviation of ln V), then with the old volumes.
     rng : numpy.random.Generator
     width : float
     order : int
@@ -37,7 +37,7 @@ def moved(foam: Foam, move: str, rng: np.random.Generator, width: float, order: 
     """
     if move == "shake":
         return _shaken(foam, rng, width, order)
-    turned = _turned(foam, rng, 2 if move == "pair" else 1)
+    turned = _turned(foam, rng, move)
     return None if turned is None else _relaxed(turned, order)
 
 
@@ -57,12 +57,12 @@ def _shaken(foam: Foam, rng: np.random.Generator, width: float, order: int) -> R
     return _relaxed(replace(there.foam, target_volumes=foam.target_volumes, pressures=None), order)
 
 
-def _turned(foam: Foam, rng: np.random.Generator, count: int) -> Foam | None:
-    """The foam after T1s on random films, each but the first among the films round the one before."""
-    network = foam.network
-    choice = np.flatnonzero(turnable(network))
+def _turned(foam: Foam, rng: np.random.Generator, move: str) -> Foam | None:
+    """The foam after a T1 on a random film, and in a pair a second on one of the films round it."""
+    fine = turnable(foam.network)
+    choice = np.flatnonzero(fine & (charge_rise(foam.network) <= 0) if move == "glide" else fine)
     try:
-        for _ in range(count):
+        for _ in range(2 if move == "pair" else 1):
             if not choice.size:
                 return None
             film = int(rng.choice(choice))
@@ -83,9 +83,22 @@ def turnable(network: CellNetwork) -> Bools:
     return out
 
 
+def charge_rise(network: CellNetwork) -> Ints:
+    """By how much a T1 on each film would raise Σ q², (n_films,).
+
+    The charges of the two bubbles beside it rise by 1, those of the two at its ends fall by 1. 0 where a
+    dislocation glides, −4 where two of them annihilate.
+    """
+    q = network.charges[t1_sites(network, np.arange(network.n_films)).bubbles]
+    out: Ints = 4 + 2 * (q[:, 0] + q[:, 1] - q[:, 2] - q[:, 3])
+    return out
+
+
 def films_round(network: CellNetwork, film: int) -> Ints:
     """The films of the four bubbles that a T1 on ``film`` concerns, without itself."""
     four = t1_sites(network, np.array([film])).bubbles[0]
-    touches: Bools = np.asarray(np.isin(network.bubble, four)).reshape(-1, 2).any(axis=1)
+    member = np.zeros(network.n_bubbles, dtype=bool)
+    member[four] = True
+    touches = member[network.left] | member[network.right]
     touches[film] = False
     return np.flatnonzero(touches)
