@@ -1,10 +1,10 @@
 """Least partitions of the unit sphere into n equal areas: searches, and writes minimal_partitions.csv.
 
-    python data/make_partitions.py [STATE_FOLDER] [N ...]
+    python data/make_partitions.py [STATE_FOLDER] [STARTS] [N ...]
 
-n = 2 … 32 and 72 by default; half an hour on one core. States are kept in the folder, so that a run that
-was stopped goes on; rows of other n in the table stay. A search ends early once the known length is reached
-(to 1e-9), and otherwise after all its starts.
+At most 60 starts for each of n = 2 … 32 and 72 by default; about half an hour on one core. States are kept
+in the folder, so that a run that was stopped goes on, and a later one may make more starts; rows of other n
+in the table stay. A search ends early once the known length is reached.
 """
 
 from __future__ import annotations
@@ -26,23 +26,24 @@ KNOWN = {
     6: 12.0 * np.arccos(1.0 / 3.0), 7: 16.35196950, 8: 17.69270805, 9: 18.85041320, 10: 19.99976253,
     12: 21.89182969, 14: 23.95812912, 20: 28.99917241,
 }  # fmt: skip
-SEED, BATCH, MOST, HOPS = 6, 15, 60, 20
+SEED, BATCH, HOPS = 6, 15, 20
 COLUMNS = (
     "n", "length", "known", "difference", "check", "group", "group_order", "sides",
     "starts", "failed", "reached", "hops", "seed", "residual", "seconds",
 )  # fmt: skip
 
 
-def search(n: int, folder: Path) -> dict[str, object]:
+def search(n: int, folder: Path, most: int, spent: float) -> dict[str, object]:
+    """The row of n; ``spent`` are the seconds that earlier runs took."""
     began = time.perf_counter()
     known = KNOWN.get(n)
-    for starts in range(BATCH, MOST + 1, BATCH):
+    for starts in range(BATCH, most + 1, BATCH):
         found = wf.minimal_partition(
             wf.Sphere(1.0), n, seed=SEED, starts=starts, hops=HOPS, folder=folder / f"n{n}"
         )
         if known is not None and found.length < known + 1e-8:
             break
-    seconds = time.perf_counter() - began
+    seconds = time.perf_counter() - began + spent
     # films of the highest order in use anywhere: tells whether order 10 was enough
     fine = wf.relax(found.foam, order=16)
     threefold = (found.foam.network.vertex_degrees == 3).all()
@@ -68,7 +69,7 @@ def search(n: int, folder: Path) -> dict[str, object]:
     }
 
 
-def main(folder: str = "out/partitions", *numbers: str) -> None:
+def main(folder: str = "out/partitions", most: str = "60", *numbers: str) -> None:
     state = Path(folder)
     state.mkdir(parents=True, exist_ok=True)
     rows: dict[int, dict[str, object]] = {}
@@ -76,7 +77,8 @@ def main(folder: str = "out/partitions", *numbers: str) -> None:
         with TABLE.open(encoding="utf-8", newline="") as stream:
             rows = {int(row["n"]): dict(row) for row in csv.DictReader(stream)}
     for n in map(int, numbers) if numbers else (*range(2, 33), 72):
-        rows[n] = search(n, state)
+        spent = float(str(rows[n]["seconds"])) if n in rows and (state / f"n{n}").exists() else 0.0
+        rows[n] = search(n, state, int(most), spent)
         print("  ".join(f"{k} {rows[n][k]}" for k in COLUMNS), flush=True)
         with atomic_text(TABLE) as stream:
             writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")

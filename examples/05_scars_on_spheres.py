@@ -1,9 +1,9 @@
 """Scars on spheres: how many 5-7 pairs does a disclination of a large foam gather round itself?
 
 Points that repel each other (1/r³) are a good crystal; their Voronoi foams are relaxed and annealed by
-gliding dislocations and pairs of T1s. Above R/a of about 5 (a is the lattice spacing) crystals of particles on
-a sphere screen each of their twelve fivefold sites by a scar of about 0.41 R/a − 2 excess 5-7 pairs (Bausch et
-al., Science 299, 1716 (2003)). Foams are softer: the line is a comparison, not a prediction.
+gliding dislocations and pairs of T1s. Above R/a of about 5 (a is the lattice spacing) crystals of particles
+on a sphere screen each of their twelve fivefold sites by a scar of about 0.41 R/a − 2 excess 5-7 pairs
+(Bausch et al., Science 299, 1716 (2003)). Foams are softer: the line is a comparison, not a prediction.
 
     python examples/05_scars_on_spheres.py [SEEDS] [LARGEST] [FOLDER]
 """

@@ -157,15 +157,16 @@ def minimal_partition(
 
     References
     ----------
-    S. J. Cox and E. Flikkema, Electronic Journal of Combinatorics 17, R45 (2010), for candidates in the
-    plane by similar moves; T. C. Hales, Trans. Amer. Math. Soc. 353, 2001, for n = 12.
+    T. C. Hales, *The honeycomb problem on the sphere*, arXiv:math/0211234 (2002), n = 12; M. Engelstein,
+    Discrete Comput. Geom. 44, 645 (2010), n = 4; S. J. Cox and E. Flikkema, Electron. J. Combin. 17, R45
+    (2010), for candidates in a plane disk found by similar moves.
 
     Examples
     --------
     >>> from warpedfoam import Sphere
     >>> found = minimal_partition(Sphere(1.0), 4, starts=2, hops=0)
-    >>> round(found.length, 8), round(6 * np.arccos(-1 / 3), 8)
-    (11.46379942, 11.46379942)
+    >>> round(found.length, 8), found.n_reached  # 6 arccos(−1/3), a regular tetrahedron
+    (11.46379942, 2)
     """
     as_instance(surface, "surface", Surface)  # type: ignore[type-abstract]
     count = as_integer(n, "n", minimum=2, maximum=100_000)

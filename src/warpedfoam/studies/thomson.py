@@ -15,6 +15,8 @@ from warpedfoam.surfaces.protocol import Surface
 
 #: Pairs handled at once, and iterations between returns to the surface.
 BLOCK, ROUND = 2_000_000, 50
+#: What the logarithm of an energy never reaches.
+WALL = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,8 @@ def thomson_points(
 
     Notes
     -----
-    One evaluation costs O(n²) time, and memory for two million pairs.
+    One evaluation costs O(n²) time, and memory for two million pairs. On surfaces that repeat the force
+    jumps where the nearest image of a pair changes, and need not fall below about 1e-2.
 
     References
     ----------
@@ -154,18 +157,21 @@ def _state(surface: Surface, points: Floats, s: float, spacing: float) -> tuple[
 
 
 def _objective(unknowns: Floats, surface: Surface, s: float, spacing: float) -> tuple[float, Floats]:
-    """log E(Π(y)) and its gradient by the unknowns, y / spacing."""
+    """log(E(Π(y)) spacing^s) and its gradient by the unknowns, y / spacing."""
     y = unknowns.reshape(-1, 3) * spacing
-    x = surface.project(y)
+    try:
+        x = surface.project(y)
+    except ValueError:  # a trial step so far that a point has no nearest point: a wall to step back from
+        return WALL, np.zeros(y.size)
     energy, slope = riesz_energy(x, s, surface.period)
     if not np.isfinite(energy):
-        return np.inf, np.zeros(y.size)
+        return WALL, np.zeros(y.size)
     n = surface.normals(x)
     height = np.einsum("ij,ij->i", nearest_image(y - x, surface.period), n)
     tangent = slope - np.einsum("ij,ij->i", slope, n)[:, None] * n
     bent = np.eye(3) + height[:, None, None] * surface.shape_operators(x, project=False)
     gradient = np.linalg.solve(bent, tangent[:, :, None])[:, :, 0]
-    return float(np.log(energy)), (gradient * (spacing / energy)).ravel()
+    return float(np.log(energy) + s * np.log(spacing)), (gradient * (spacing / energy)).ravel()
 
 
 def riesz_energy(points: Floats, exponent: float, period: Floats | None = None) -> tuple[float, Floats]:
