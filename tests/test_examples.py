@@ -27,6 +27,7 @@ def example(name: str) -> ModuleType:
 def test_every_example_is_tested() -> None:
     assert {p.stem for p in EXAMPLES.glob("*.py")} == {
         "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply", "04_defects_on_tori",
+        "05_scars_on_spheres",
     }  # fmt: skip
 
 
@@ -62,3 +63,14 @@ def test_defects_on_tori(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         "charge_1.5.png", "charge_3.png", "charge_6.png", "defects.png",
     }  # fmt: skip
     assert len(capsys.readouterr().out.splitlines()) == 7
+
+
+def test_scars_on_spheres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scars = example("05_scars_on_spheres")
+    monkeypatch.setattr(scars, "WORK", 1000)
+    (row,) = scars.main(1, 100, tmp_path)
+    # too small for scars: twelve fives
+    assert row["clusters of charge 1"] == 12
+    assert row["excess pairs"] <= 2
+    assert row["energy"] <= row["start energy"]
+    assert (tmp_path / "scars.png").stat().st_size > 10_000

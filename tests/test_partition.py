@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import csv
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import warpedfoam as wf
+from warpedfoam.cli.app import app
 from warpedfoam.studies.partition import THIN, equal_area_length
 
 SPHERE = wf.Sphere(1.0)
@@ -49,12 +53,14 @@ def test_the_table_of_the_data_folder() -> None:
             sides = [part.split("^") for part in row["sides"].split()]
             assert sum(int(k) for _, k in sides) == n
             assert sum((6 - int(s)) * int(k) for s, k in sides) == 12
-    # more bubbles need more film, and no less than hexagons of the same area would have in the plane, about
-    lengths = np.array([float(rows[n]["length"]) for n in range(2, 21)])
-    assert (np.diff(lengths) > 0.0).all()
-    flat = 12.0**0.25 * np.sqrt(4.0 * np.pi * np.arange(2, 21))
-    assert (lengths[4:] / flat[4:] > 0.95).all()
-    assert (lengths / flat < 1.0).all()
+    # Fejes Toth's bound: regular polygons of 6 - 12/n sides with corners of 120 degrees, closed for 3, 4, 6, 12
+    n = np.array(sorted(rows))[1:]
+    lengths = np.array([float(rows[k]["length"]) for k in n])
+    bound = 6.0 * (n - 2) * np.arccos(np.cos(np.pi / (6.0 - 12.0 / n)) / np.sin(np.pi / 3.0))
+    regular = np.isin(n, [3, 4, 6, 12])
+    np.testing.assert_allclose(lengths[regular], bound[regular], rtol=1e-9)
+    assert (lengths[~regular] > bound[~regular] * 1.0001).all()
+    assert (lengths < bound * 1.02).all()
 
 
 def test_scale_and_seed() -> None:
@@ -144,3 +150,34 @@ def test_halves_of_an_ellipsoid_are_too_large_for_its_volumes() -> None:
     # level-set surfaces hold bubbles that are small against the radii of curvature
     with pytest.raises(wf.ResolutionError, match="2 bubbles cannot be laid out"):
         wf.minimal_partition(wf.Ellipsoid(1.0, 1.0, 1.5), 2, starts=1)
+
+
+def test_the_page_runs_and_shows_the_table() -> None:
+    text = (TABLE.parents[1] / "docs" / "partitions.md").read_text(encoding="utf-8")
+    space: dict[str, Any] = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+        exec(compile(block, "partitions.md", "exec"), space)
+    assert space["found"].length == pytest.approx(21.89182969, abs=1e-8)
+    assert space["annealed"].energy <= space["annealed"].start_energy
+    with TABLE.open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            assert f"| {row['n']} | {row['length']} | " in text
+
+
+def test_the_command(tmp_path: Path) -> None:
+    given = ["partition", "sphere", "--size", "radius=1", "-n", "6", "--starts", "2", "--hops", "1"]
+    done = CliRunner().invoke(app, [*given, "-o", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    facts = json.loads(done.stdout)
+    assert facts["length"] == pytest.approx(KNOWN[6], abs=1e-9)
+    assert (facts["point_group"], facts["sides"], facts["reached"]) == ("Oh", {"4": 6}, 2)
+    names = {p.name for p in tmp_path.iterdir()}
+    assert names == {"partition.npz", "tries.csv", "partition.png", "partition.json", "state"}
+    assert wf.load(tmp_path / "partition.npz").film_lengths.sum() == pytest.approx(KNOWN[6], abs=1e-9)
+    # once more: read from the state
+    again = CliRunner().invoke(app, [*given, "-o", str(tmp_path), "--no-picture"])
+    assert "reached by 2 of 2 starts" in again.stdout
+    assert not (tmp_path / "partition.png").exists()
+    for wrong in (["--size", "radius"], ["--size", "radius=x"], ["--size", "width=1"]):
+        bad = CliRunner().invoke(app, ["partition", "sphere", "-n", "6", *wrong, "-o", str(tmp_path)])
+        assert bad.exit_code == 2
