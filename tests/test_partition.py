@@ -53,7 +53,7 @@ def test_the_table_of_the_data_folder() -> None:
             sides = [part.split("^") for part in row["sides"].split()]
             assert sum(int(k) for _, k in sides) == n
             assert sum((6 - int(s)) * int(k) for s, k in sides) == 12
-    # Fejes Toth's bound: regular polygons of 6 - 12/n sides with corners of 120 degrees, closed for 3, 4, 6, 12
+    # Fejes Toth's bound: regular polygons of 6 - 12/n sides, corners of 120 degrees; closed for 3, 4, 6, 12
     n = np.array(sorted(rows))[1:]
     lengths = np.array([float(rows[k]["length"]) for k in n])
     bound = 6.0 * (n - 2) * np.arccos(np.cos(np.pi / (6.0 - 12.0 / n)) / np.sin(np.pi / 3.0))

@@ -68,7 +68,8 @@ def search(
     if picture:
         from warpedfoam.plot import save_picture
 
-        save_picture(folder / PICTURE, found.foam, color_by="charge")
+        title = f"{n} equal areas, length {found.length:.8g}"
+        save_picture(folder / PICTURE, found.foam, color_by="charge", title=title)
         names.append(PICTURE)
     else:
         (folder / PICTURE).unlink(missing_ok=True)
