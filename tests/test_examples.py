@@ -37,6 +37,7 @@ def test_every_example_is_tested() -> None:
     assert {p.stem for p in EXAMPLES.glob("*.py")} == {
         "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply", "04_defects_on_tori",
         "05_polydispersity_ensemble",
+        "06_scars_on_spheres",
     }  # fmt: skip
     assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
@@ -97,3 +98,14 @@ def test_polydispersity_ensemble(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert (tmp_path / "polydispersity.png").stat().st_size > 10_000
     assert (tmp_path / "polydispersity" / "ensemble.parquet").exists()
     assert len(capsys.readouterr().out.splitlines()) == 6
+
+
+def test_scars_on_spheres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scars = example("06_scars_on_spheres")
+    monkeypatch.setattr(scars, "WORK", 1000)
+    (row,) = scars.main(1, 100, tmp_path)
+    # too small for scars: twelve fives
+    assert row["clusters of charge 1"] == 12
+    assert row["excess pairs"] <= 2
+    assert row["energy"] <= row["start energy"]
+    assert (tmp_path / "scars.png").stat().st_size > 10_000

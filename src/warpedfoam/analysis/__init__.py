@@ -16,6 +16,7 @@ from warpedfoam.analysis.honeycomb import honeycomb_bound
 from warpedfoam.analysis.order import BondOrder, bond_order
 from warpedfoam.analysis.sides import SideDistribution, side_distribution
 from warpedfoam.analysis.statistics import FoamStatistics, foam_statistics
+from warpedfoam.analysis.symmetry import PointGroup, point_group
 
 __all__ = [
     "KINDS",
@@ -26,6 +27,7 @@ __all__ = [
     "DefectReport",
     "EquilibriumReport",
     "FoamStatistics",
+    "PointGroup",
     "SideDistribution",
     "band_curvatures",
     "bond_order",
@@ -38,5 +40,6 @@ __all__ = [
     "excess_charges",
     "foam_statistics",
     "honeycomb_bound",
+    "point_group",
     "side_distribution",
 ]

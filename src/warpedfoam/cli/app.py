@@ -385,6 +385,46 @@ def ensemble(
         raise typer.Exit(NOT_CONVERGED)
 
 
+@app.command()
+def partition(
+    surface: Annotated[
+        str, typer.Argument(help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE")
+    ],
+    n_bubbles: Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of equal areas.")],
+    size: Annotated[
+        list[str] | None, typer.Option("--size", metavar="NAME=VALUE", help="A size, such as radius=1.")
+    ] = None,
+    starts: Annotated[int, typer.Option("--starts", help="Starts of the search.")] = 30,
+    hops: Annotated[int, typer.Option("--hops", help="Moves tried from each start.")] = 20,
+    seed: Seed = 0,
+    out: Folder = "out",
+    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the partition.")] = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Search for the shortest films that divide a surface into equal areas; goes on where it was stopped."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli import partition as job
+
+        with progress_bars(quiet=quiet) as report:
+            facts = job.search(
+                surface,
+                size or [],
+                n_bubbles,
+                seed=seed,
+                starts=starts,
+                hops=hops,
+                out=out,
+                picture=picture,
+                progress=report,
+            )
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(job.summary_text(facts), flush=True)
+
+
 def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments in the shape of a TOML file."""
     foam = {name: given[name] for name in ("n_bubbles", "seeds", "cells", "lloyd")}

@@ -1,8 +1,10 @@
-"""Studies: geodesic circles, one bubble between its plates, the potential of curvature, ensembles."""
+"""Studies: circles, single bubbles and their potential, annealing and least partitions, ensembles."""
 
+from warpedfoam.studies.annealing import Annealing, AnnealingHistory, anneal
 from warpedfoam.studies.bubble import BubbleBetweenPlates, bubble_between_plates
 from warpedfoam.studies.ensemble import Ensemble, run_ensemble
 from warpedfoam.studies.geodesic_circle import GeodesicCircle, geodesic_circle
+from warpedfoam.studies.partition import MinimalPartition, PartitionTry, minimal_partition
 from warpedfoam.studies.potential import (
     GeometricPotential,
     drift_path,
@@ -10,18 +12,27 @@ from warpedfoam.studies.potential import (
     write_potential_csv,
 )
 from warpedfoam.studies.study import Study, read_study
+from warpedfoam.studies.thomson import ThomsonPoints, thomson_points
 
 __all__ = [
+    "Annealing",
+    "AnnealingHistory",
     "BubbleBetweenPlates",
     "Ensemble",
     "GeodesicCircle",
     "GeometricPotential",
+    "MinimalPartition",
+    "PartitionTry",
     "Study",
+    "ThomsonPoints",
+    "anneal",
     "bubble_between_plates",
     "drift_path",
     "geodesic_circle",
     "geometric_potential",
+    "minimal_partition",
     "read_study",
     "run_ensemble",
+    "thomson_points",
     "write_potential_csv",
 ]

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Bools, Floats, Ints, frozen
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.quadrature import LobattoRule, gauss
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 #: Samples between two knots for the first guess of a nearest point, and Newton steps from there.
 SAMPLES, NEAREST_STEPS = 2, 8
@@ -270,6 +273,9 @@ class Rim:
 
 
 def _fitted(loop: int, points: Floats, start: float, *, closed: bool) -> _Side:
+    # slow to import, and closed surfaces have no use for it
+    from scipy.interpolate import BSpline, make_interp_spline
+
     if closed:
         points = np.concatenate([points, points[:1]])
     chord = np.linalg.norm(np.diff(points, axis=0), axis=1)

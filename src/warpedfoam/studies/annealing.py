@@ -1,0 +1,270 @@
+"""`anneal`: lower the energy of a foam by thermal T1s and shaking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpedfoam.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    as_choice,
+    as_instance,
+    as_integer,
+    as_number,
+    frozen,
+)
+from warpedfoam.errors import ConvergenceError
+from warpedfoam.foam import MAX_ORDER, Foam
+from warpedfoam.io.atomic import PathLike
+from warpedfoam.relax import relax
+from warpedfoam.studies.checkpoint import Checkpoint, fingerprint
+from warpedfoam.studies.foam_moves import MOVES, moved
+
+#: Energies that differ by less than this share are the same minimum.
+SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class AnnealingHistory:
+    """One row per step; arrays (n_steps,).
+
+    Attributes
+    ----------
+    move : (n_steps,) array of str
+        ``"t1"``, ``"pair"``, ``"glide"`` or ``"shake"``.
+    temperature : (n_steps,) array
+        In units of γ d ℓ.
+    proposed : (n_steps,) array
+        Energy of the relaxed proposal; NaN where the move failed (it could not be made, or the foam did
+        not converge).
+    accepted : (n_steps,) array of bool
+        Whether it was taken, back to the same minimum included.
+    n_t1 : (n_steps,) array
+        T1s of the final relaxation, besides those of the move itself.
+    energy, best : (n_steps,) array
+        Of the present foam and of the best one after the step.
+    """
+
+    move: NDArray[np.str_]
+    temperature: Floats
+    proposed: Floats
+    accepted: Bools
+    n_t1: Ints
+    energy: Floats
+    best: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Annealing:
+    """What `anneal` found.
+
+    Attributes
+    ----------
+    foam : Foam
+        The best foam met, relaxed.
+    energy : float
+        Its energy.
+    start_energy : float
+        Energy of the relaxed start.
+    last : Foam
+        Where the walk ended.
+    history : AnnealingHistory
+    seed : int
+    """
+
+    foam: Foam
+    energy: float
+    start_energy: float
+    last: Foam
+    history: AnnealingHistory
+    seed: int
+
+    @property
+    def n_accepted(self) -> int:
+        """Number of steps taken."""
+        return int(self.history.accepted.sum())
+
+
+def anneal(
+    foam: Foam,
+    *,
+    steps: int = 100,
+    moves: Sequence[str] = MOVES,
+    temperature: float = 0.05,
+    cooling: float = 0.01,
+    width: float = 0.3,
+    order: int | None = None,
+    seed: int = 0,
+    folder: PathLike | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Annealing:
+    """Search for foams of lower energy: a Metropolis walk from one relaxed foam to the next.
+
+    Each step draws a move, relaxes, and takes the new foam with the probability min(1, exp(−ΔE/T_k)),
+    T_k = temperature · cooling^(k/(steps − 1)) · γ d ℓ with ℓ = sqrt(area/N) and d the measure of a film of
+    unit length. The volumes at the end of every step are the foam's own. The best foam met is kept. This
+    searches; it does not sample Boltzmann's distribution of minima, since forward and backward moves
+    need not be equally likely.
+
+    Parameters
+    ----------
+    foam : Foam
+        Relaxed or not.
+    steps : int, optional
+    moves : sequence of {"t1", "pair", "glide", "shake"}, optional
+        Drawn with equal chances: a T1 on a random film; two T1s beside each other (moving, making or
+        removing dislocations); a T1 on a film drawn from those where Σ q² would not rise (dislocations
+        glide or annihilate: what large foams need); a cycle of polydispersity, which shakes the whole foam.
+    temperature : float, optional
+        Of the first step, in units of γ d ℓ; 0 takes no step uphill.
+    cooling : float, optional
+        Last temperature over the first, above 0 and up to 1.
+    width : float, optional
+        Standard deviation of ln V in the first shake; it falls as the square root of the temperature.
+    order : int, optional
+        p of the films; the foam's own by default.
+    seed : int, optional
+        Step k draws from the generator of (seed, k).
+    folder : str or path, optional
+        Keep the state here after every step, and go on from the state found here. A killed run loses the
+        step that it was in and ends with the same numbers as one that was not killed.
+    progress : callable, optional
+        Called as ``progress("anneal", fraction)`` after each step.
+
+    Returns
+    -------
+    Annealing
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of the wrong type or out of range, or ``folder`` holds another run.
+    ConvergenceError
+        If the start does not relax.
+
+    Examples
+    --------
+    >>> from warpedfoam import HeleShawCell, Sphere, voronoi_foam
+    >>> foam = voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), n_bubbles=20, seed=1)
+    >>> found = anneal(foam, steps=10, seed=4)
+    >>> found.energy <= found.start_energy, len(found.history.best)
+    (True, 10)
+    """
+    as_instance(foam, "foam", Foam)
+    count = as_integer(steps, "steps", minimum=0, maximum=10_000_000)
+    kinds = _moves(moves)
+    heat = as_number(temperature, "temperature", minimum=0.0, maximum=1e6)
+    ratio = as_number(cooling, "cooling", positive=True, maximum=1.0)
+    spread = as_number(width, "width", positive=True, maximum=1.0)
+    p = as_integer(foam.order if order is None else order, "order", minimum=2, maximum=MAX_ORDER)
+    start_seed = as_integer(seed, "seed", minimum=0)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    checkpoint = None
+    if folder is not None:
+        key = {
+            "start": fingerprint(foam),
+            "steps": count,
+            "moves": list(kinds),
+            "temperature": heat,
+            "cooling": ratio,
+            "width": spread,
+            "order": p,
+            "seed": start_seed,
+        }
+        checkpoint = Checkpoint(folder, "anneal", key)
+    found = None if checkpoint is None else checkpoint.read()
+    if found is None:
+        walk = _started(foam, p)
+        if checkpoint is not None:
+            checkpoint.write(walk.state(), walk.foams())
+    else:
+        walk = _Walk(found[1]["now"], found[1]["best"], found[0]["start_energy"], found[0]["rows"])
+    unit = energy_unit(foam)
+    for k in range(len(walk.rows), count):
+        cooled = ratio ** (k / max(count - 1, 1))
+        rng = np.random.default_rng([start_seed, k])
+        move = kinds[int(rng.integers(len(kinds)))]
+        walk.step(move, rng, heat * cooled, unit, spread * float(np.sqrt(cooled)), p)
+        if checkpoint is not None:
+            checkpoint.write(walk.state(), walk.foams())
+        if progress is not None:
+            progress("anneal", (k + 1) / count)
+    return Annealing(
+        walk.best, walk.best.energy, walk.start_energy, walk.now, _history(walk.rows), start_seed
+    )
+
+
+def energy_unit(foam: Foam) -> float:
+    """γ times the area of a film as long as a bubble is wide, ℓ, in units of energy."""
+    return foam.tension * float(foam.cell.layer.shares.sum()) * foam.bubble_size
+
+
+@dataclass
+class _Walk:
+    """Where the walk is, the best it met, and a row (as plain values) per step."""
+
+    now: Foam
+    best: Foam
+    start_energy: float
+    rows: list[list[Any]]
+
+    def step(
+        self, move: str, rng: np.random.Generator, heat: float, unit: float, width: float, order: int
+    ) -> None:
+        """Propose, relax, and take or leave it."""
+        chance = float(rng.random())
+        energy = self.now.energy
+        trial = moved(self.now, move, rng, width, order)
+        proposed: float | None = None
+        n_t1, accepted = 0, False
+        if trial is not None and trial.converged:
+            proposed, n_t1 = trial.energy, trial.n_t1
+            rise = proposed - energy
+            accepted = rise <= 0.0 or (heat > 0.0 and chance < float(np.exp(-rise / (heat * unit))))
+            if accepted and abs(rise) > SAME * energy:
+                self.now = trial.foam
+                if proposed < self.best.energy:
+                    self.best = trial.foam
+        self.rows.append([move, heat, proposed, accepted, n_t1, self.now.energy, self.best.energy])
+
+    def state(self) -> Mapping[str, Any]:
+        return {"start_energy": self.start_energy, "rows": self.rows}
+
+    def foams(self) -> Mapping[str, Foam]:
+        return {"now": self.now, "best": self.best}
+
+
+def _started(foam: Foam, order: int) -> _Walk:
+    first = relax(foam, order=order, solver="superlu")
+    if not first.converged:
+        raise ConvergenceError(f"the start does not relax: {first.message}")
+    return _Walk(first.foam, first.foam, first.energy, [])
+
+
+def _moves(moves: object) -> tuple[str, ...]:
+    if isinstance(moves, str) or not isinstance(moves, Sequence):
+        raise TypeError(f"moves must be a sequence of {', '.join(map(repr, MOVES))}, got {moves!r}")
+    if not moves:
+        raise ValueError(f"moves must name one move at least, of {', '.join(map(repr, MOVES))}")
+    return tuple(as_choice(move, "moves", MOVES) for move in moves)
+
+
+def _history(rows: list[list[Any]]) -> AnnealingHistory:
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 7
+    proposed = [np.nan if e is None else e for e in columns[2]]
+    return AnnealingHistory(
+        frozen(np.array(columns[0], dtype=np.str_)),
+        frozen(np.array(columns[1], dtype=np.float64)),
+        frozen(np.array(proposed, dtype=np.float64)),
+        frozen(np.array(columns[3], dtype=np.bool_)),
+        frozen(np.array(columns[4], dtype=np.int64)),
+        frozen(np.array(columns[5], dtype=np.float64)),
+        frozen(np.array(columns[6], dtype=np.float64)),
+    )
