@@ -79,10 +79,8 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
     alone = {"set_as_default": False}
     settings = {
-        "distributed.nanny.pre-spawn-environ": {
-            **dask.config.get("distributed.nanny.pre-spawn-environ", {}),
-            **ONE_THREAD,
-        },
+        # without dask's own MALLOC_TRIM_THRESHOLD_: giving memory back all the time costs a third of it
+        "distributed.nanny.pre-spawn-environ": ONE_THREAD,
         # memory is the system's affair: a worker paused or ended at some share of it would change the table
         "distributed.worker.memory.terminate": False,
         "distributed.worker.memory.pause": False,
