@@ -91,6 +91,7 @@ def save(path: PathLike, foam: Foam) -> Path:
         "n_heights": foam.cell.n_heights,
         "tension": foam.tension,
         "seed": foam.seed,
+        "exterior": foam.exterior,
         "pressures": foam.pressures is not None,
     }
     text = json.dumps(header, allow_nan=False, sort_keys=True)
@@ -220,6 +221,7 @@ def _foam(arrays: Arrays, known: Mapping[str, type]) -> Foam:
         tension=header["tension"],
         pressures=arrays["pressures"] if header["pressures"] is True else None,
         seed=header["seed"],
+        exterior=header.get("exterior"),
     )
 
 

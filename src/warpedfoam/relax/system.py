@@ -79,12 +79,23 @@ class System:
     """Builds and solves the Newton systems of one foam, and keeps the time they take."""
 
     def __init__(
-        self, cell: HeleShawCell, targets: Floats, order: int, factoriser: Factoriser, n_bubbles: int
+        self,
+        cell: HeleShawCell,
+        targets: Floats,
+        order: int,
+        factoriser: Factoriser,
+        n_bubbles: int,
+        exterior: int | None = None,
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
+        self.exterior = exterior
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
-        self.film_unit = float(cell.layer.shares.sum()) * self.length
         self.mean_volume = float(targets.mean())
+        if exterior is not None:
+            # the clusters set the scale, not the cell round them
+            self.mean_volume = float(np.delete(targets, exterior).mean())
+            self.length = float(np.sqrt(cell.surface.area * self.mean_volume / cell.volume))
+        self.film_unit = float(cell.layer.shares.sum()) * self.length
         self.shares = targets / self.mean_volume
         self.invariant = cell.surface.precision <= INVARIANT
         self.rule = lobatto(order)
@@ -153,11 +164,24 @@ class Linearised:
         self.volumes = volumes / system.mean_volume
         # one constraint is redundant: what all volumes together are off by (round-off, if nothing has
         # slipped) is shared out, or a single bubble would bear the round-off of all
-        excess = float(self.volumes.sum() / system.shares.sum())
-        self.slip = abs(excess - 1.0)
+        excess, self.slip = self._excess()
         self.volume_fault = self.volumes - excess * system.shares
         relative = np.abs(self.volume_fault) / system.shares
         self.residuals = self._residuals(float(relative.max()))
+
+    def _excess(self) -> tuple[float, float]:
+        """All volumes over what they should add up to, and how far they fail to; an exterior takes the rest."""
+        system = self.system
+        total, loops = float(system.shares.sum()), float(self.volumes.sum())
+        if system.exterior is None:
+            return loops / total, abs(loops / total - 1.0)
+        volumes = self.volumes
+        volumes[system.exterior] = 0.0
+        clusters = float(volumes.sum())
+        volumes[system.exterior] = total - clusters
+        # run the other way round, the exterior's loops hold the clusters, or all but them
+        fault = min(abs(loops), abs(loops - total)) if system.invariant else 0.0
+        return 1.0, fault / max(clusters, 1e-300)
 
     def _residuals(self, volume_error: float) -> Residuals:
         network = self.state.network
