@@ -6,10 +6,13 @@ are vertex steps, film offsets and pressures; the offsets are eliminated film by
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from warpedfoam.arrays import Floats, Ints
 from warpedfoam.cell import HeleShawCell
@@ -203,6 +206,14 @@ class Linearised:
             force = np.inf
         return Residuals(at_vertex, self.volume_fault, force, volume_error)
 
+    def loaded(self, forces: Floats) -> Linearised:
+        """The same state under ``forces`` (p + 3, F) in place of its own; Hessian and volumes are shared."""
+        other = copy(self)
+        other.force = forces
+        relative = np.abs(self.volume_fault) / self.system.shares
+        other.residuals = other._residuals(float(relative.max()))
+        return other
+
     def without_rigid(self, forces: Floats) -> Floats:
         """Vertex forces (2 n_vertices,) without their rigid part, where that is no real force."""
         if self.rigid is None:
@@ -248,8 +259,20 @@ def one_ring(network: CellNetwork, values: Floats) -> Floats:
 
 
 def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
-    """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do."""
+    """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do.
+
+    Parts of a foam that no films join move on their own, and turn where the surface is flat.
+    """
     modes = cell.surface.rigid_motions(state.points)
+    network = state.network
+    if (network.bubble_euler != 1).any() or len(network.markers):
+        links = coo_array((np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2)
+        count, part = connected_components(links, directed=False)
+        if cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
+            turning = np.cross(cell.surface.normals(state.points), state.points)
+            modes = np.concatenate([modes, turning[None]])
+        own = part == np.arange(count)[:, None]
+        modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     held = held_vertices(cell.surface, state.network, state.points, state.offsets)
