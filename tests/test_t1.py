@@ -285,7 +285,7 @@ def test_a_lens_and_the_film_beside_it():
 
 
 def test_bubbles_that_are_no_disks_take_part():
-    """An exterior may gain or lose a film whatever its Euler number and its sides; the rest stays a network."""
+    """An exterior may gain or lose a film whatever its Euler number and its sides."""
     net = NETWORKS["torus of 60"]
     euler = np.array(net.bubble_euler)
     # declare two bubbles something else; the sum, and with it the surface, does not matter here

@@ -66,7 +66,14 @@ from warpedfoam.plot import (
     save_picture,
 )
 from warpedfoam.relax import Relaxation, relax
-from warpedfoam.studies import GeodesicCircle, geodesic_circle
+from warpedfoam.studies import (
+    ClusterPotential,
+    GeodesicCircle,
+    cluster_clearance,
+    cluster_foam,
+    cluster_potential,
+    geodesic_circle,
+)
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
@@ -101,6 +108,7 @@ __all__ = [
     "CellNetwork",
     "ChargeEnergies",
     "ChargeProfile",
+    "ClusterPotential",
     "ConvergenceError",
     "Correlations",
     "Cylinder",
@@ -136,6 +144,9 @@ __all__ = [
     "charge_energies",
     "charge_in",
     "charge_profile",
+    "cluster_clearance",
+    "cluster_foam",
+    "cluster_potential",
     "correlations",
     "defects",
     "equilibrium_report",

@@ -195,7 +195,7 @@ class Foam:
             raise TopologyError(
                 f"the network's walls make {len(network.rim_cycles)} loops, the surface's rim has {n_loops}"
             )
-        if rim is None:
+        if rim is None or not len(network.rim_vertices):
             return
         at = self.vertex_points[network.rim_vertices]
         away = np.linalg.norm(rim.nearest(at) - at, axis=1)
@@ -257,7 +257,7 @@ class Foam:
 
     @property
     def bubble_size(self) -> float:
-        """ℓ = sqrt(area of the surface / number of bubbles), the foam's unit of length; of the clusters only."""
+        """ℓ = sqrt(area of the surface / number of bubbles), the unit of length; an exterior left out."""
         area = self.cell.surface.area
         if self.exterior is None:
             return float(np.sqrt(area / self.n_bubbles))

@@ -12,7 +12,6 @@ from warpedfoam.moves.t1 import outward_tangents
 from warpedfoam.network import CellNetwork
 from warpedfoam.surfaces.protocol import Surface
 
-
 #: Stiffness of the links that space markers, and of the hold that keeps a ring of them from turning.
 LINK, GRIP = 1e-2, 1e-7
 

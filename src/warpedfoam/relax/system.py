@@ -173,7 +173,7 @@ class Linearised:
         self.residuals = self._residuals(float(relative.max()))
 
     def _excess(self) -> tuple[float, float]:
-        """All volumes over what they should add up to, and how far they fail to; an exterior takes the rest."""
+        """All volumes over what they should be, and how far that is off; an exterior takes the rest."""
         system = self.system
         total, loops = float(system.shares.sum()), float(self.volumes.sum())
         if system.exterior is None:
@@ -266,7 +266,9 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     modes = cell.surface.rigid_motions(state.points)
     network = state.network
     if (network.bubble_euler != 1).any() or len(network.markers):
-        links = coo_array((np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2)
+        links = coo_array(
+            (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
+        )
         count, part = connected_components(links, directed=False)
         if cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
             turning = np.cross(cell.surface.normals(state.points), state.points)

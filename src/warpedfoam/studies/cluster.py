@@ -107,7 +107,7 @@ def cluster_foam(
     layouts, seed = _layouts(n_bubbles, layout, max_turn, seed)
     counts = [plan.n_bubbles for plan in layouts]
     k, n = len(layouts), sum(counts)
-    held = as_floats(np.broadcast_to(volumes, (n,)) if np.ndim(volumes) == 0 else volumes, "volumes", (n,))
+    held = as_floats(np.full(n, volumes) if np.ndim(volumes) == 0 else volumes, "volumes", (n,))
     if (held <= 0.0).any():
         raise ValueError(f"volumes must be above 0, got {held.min():g}")
     if not held.sum() < 0.9 * cell.volume:
@@ -121,7 +121,9 @@ def cluster_foam(
         middles = surface.project(as_points(np.atleast_2d(np.asarray(centre)), "centre"))
     if len(middles) != k:
         raise ValueError(f"centre must hold {k} points, one per cluster, got {len(middles)}")
-    angles = as_floats(np.broadcast_to(orientation, (k,)), "orientation", (k,))
+    angles = as_floats(
+        np.full(k, orientation) if np.ndim(orientation) == 0 else orientation, "orientation", (k,)
+    )
 
     shares = np.split(held, np.cumsum(counts)[:-1])
     units = [np.sqrt(_area_for(cell, q, share.mean())) for q, share in zip(middles, shares, strict=True)]
@@ -173,7 +175,7 @@ def cluster_clearance(foam: Foam) -> float:
 
 
 def geodesic_chart(surface: Surface, centre: Floats, plane: Floats, angle: float) -> Floats:
-    """Points (n, 3) at the ends of geodesics from ``centre`` (3,), plane vectors (n, 2) turned by ``angle``."""
+    """Ends (n, 3) of geodesics from ``centre`` (3,) along plane vectors (n, 2) turned by ``angle``."""
     first, second = surface.vertex_frames(centre[None])[0]
     x = np.broadcast_to(centre, (len(plane), 3)).copy()
     cos, sin = np.cos(angle), np.sin(angle)
@@ -237,7 +239,7 @@ def _layouts(
 
 def _simple(centres: Floats, around: Floats | None, turn: float) -> Layout:
     """A layout without holes, in one piece."""
-    if len(centres) > 1 and cKDTree(centres).query(centres, k=2)[0][:, 1].min() < 0.2 * SPACING:
+    if len(centres) > 1 and np.asarray(cKDTree(centres).query(centres, k=2)[0])[:, 1].min() < 0.2 * SPACING:
         raise ValueError("layout has two points closer than a fifth of the spacing of unit cells")
     plan = planar_layout(centres, ghosts(centres) if around is None else around, turn)
     if len(plan.outside) != 1:
@@ -255,9 +257,7 @@ def _area_for(cell: HeleShawCell, point: Floats, volume: float) -> float:
     return float(volume / (c0 + 0.5 * c1 * (k1 + k2) + c2 * k1 * k2))
 
 
-def _check_apart(
-    surface: Surface, layouts: list[Layout], placed: list[Floats], units: list[float]
-) -> None:
+def _check_apart(surface: Surface, layouts: list[Layout], placed: list[Floats], units: list[float]) -> None:
     """Refuse clusters that touch themselves, each other or the rim, by all vertices and bubble centres."""
     plane, space, owner, spacing = [], [], [], []
     for i, (plan, points, unit) in enumerate(zip(layouts, placed, units, strict=True)):
@@ -269,6 +269,11 @@ def _check_apart(
         spacing.append(np.full(len(space[-1]), unit * SPACING))
     x, u = np.concatenate(space), np.concatenate(plane)
     which, size = np.concatenate(owner), np.concatenate(spacing)
+    if surface.rim is not None:
+        away = np.linalg.norm(surface.rim.nearest(x) - x, axis=1)
+        if (away < TOUCH * size).any():
+            nearest = int(which[int(np.argmin(away / size))])
+            raise TopologyError(f"cluster {nearest} touches the rim; put its centre farther in")
     reach = float(size.max())
     if surface.period is not None:
         away = np.linalg.norm(nearest_image(x[:, None] - x[None], surface.period), axis=2)
@@ -288,12 +293,6 @@ def _check_apart(
             f"{what} near {np.round(x[a[bad[0]]], 3).tolist()}: such an exterior is none of the kind that is "
             "handled; take fewer or smaller bubbles, or other centres"
         )
-    if surface.rim is not None:
-        away = np.linalg.norm(surface.rim.nearest(x) - x, axis=1)
-        if (away < TOUCH * size).any():
-            raise TopologyError(
-                f"cluster {int(which[int(np.argmin(away / size))])} touches the rim; put its centre farther in"
-            )
 
 
 def _count_films(layouts: list[Layout]) -> int:
@@ -307,7 +306,7 @@ def _joined(layouts: list[Layout], chi: int) -> CellNetwork:
         inner += [loop + shift for loop in plan.loops]
         outer += [loop + shift for loop in plan.outside]
         shift += len(plan.points)
-    parts = network_from_loops([*inner, *outer])
+    parts = network_from_loops([loop.tolist() for loop in (*inner, *outer)])
     n = len(inner)
     euler = np.ones(n + 1, dtype=np.int64)
     euler[n] = chi - (parts.n_vertices - parts.n_films + n)

@@ -9,17 +9,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from warpedfoam.arrays import Bools, Floats, as_choice, as_floats, as_instance, as_integer, as_number, as_points, frozen
+from warpedfoam.arrays import (
+    Bools,
+    Floats,
+    as_choice,
+    as_floats,
+    as_instance,
+    as_integer,
+    as_number,
+    as_points,
+    frozen,
+)
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ConvergenceError, TopologyError
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.relax import relax
 from warpedfoam.studies.cluster import cluster_clearance, cluster_foam, geodesic_chart
-from warpedfoam.studies.held_cluster import HeldCluster, Hold, relax_held, volume_moment
+from warpedfoam.studies.held_cluster import HeldCluster, Hold, relax_held, turn_by, volume_moment
 
 #: Residual and volume error from which a cluster is held, and how often two free steps bring it there.
-ROUGH, APPROACH = 0.03, 40
+ROUGH, APPROACH = 0.01, 40
+#: Free clusters are put back when they are this far from their place, in bubble sizes.
+STRAY = 0.5
 #: Torques below this share of the energy are none; where there is none, a turn tells whether it stays so.
 NO_TORQUE, PROBE = 1e-9, 0.13
 #: Steps in which a free orientation follows its torque, how many, and how well it is found; radians.
@@ -143,7 +155,11 @@ def cluster_potential(
     surface = cell.surface
     where = surface.project(as_points(points, "points"))
     kind = as_choice(hold, "hold", ("centre", "both"))
-    angles = as_floats(np.broadcast_to(orientation, (len(where),)), "orientation", (len(where),))
+    angles = as_floats(
+        np.full(len(where), orientation) if np.ndim(orientation) == 0 else orientation,
+        "orientation",
+        (len(where),),
+    )
     tol = as_number(tolerance, "tolerance", minimum=1e-13, maximum=1e-3)
     limit = as_integer(max_iterations, "max_iterations", minimum=1)
     if progress is not None and not callable(progress):
@@ -151,8 +167,16 @@ def cluster_potential(
     if cluster is None:
         if volumes is None:
             raise TypeError("volumes must be given with n_bubbles")
-        options = {"volumes": volumes, "layout": layout, "max_turn": max_turn, "order": order, "seed": seed}
-        shape = cluster_foam(cell, n_bubbles, centre=where[0], **options)  # type: ignore[arg-type]
+        shape = cluster_foam(
+            cell,
+            n_bubbles,
+            volumes=volumes,
+            layout=layout,
+            centre=where[0],
+            max_turn=max_turn,
+            order=order,
+            seed=seed,
+        )
     else:
         if n_bubbles is not None or volumes is not None:
             raise ValueError("cluster already has its bubbles and volumes: leave out n_bubbles and volumes")
@@ -215,12 +239,11 @@ def _held_at(
     frame = surface.vertex_frames(point[None])[0]
     arms = plane * (shape.network.vertex_degrees == 3)[:, None]
     placed = geodesic_chart(surface, point, plane, angle)
-    start = _near_rest(replace(shape, vertex_points=placed, pressures=None))
+    start = _near_rest(replace(shape, vertex_points=placed, pressures=None), point, arms @ turn_by(angle))
     near = np.round(point, 3).tolist()
 
     def solve(alpha: float, foam: Foam) -> _Rest:
-        cos, sin = np.cos(alpha), np.sin(alpha)
-        turned = arms @ np.array([[cos, sin], [-sin, cos]]) if arms.any() else None
+        turned = arms @ turn_by(alpha) if arms.any() else None
         held = relax_held(foam, Hold(point, frame, turned), tolerance=tolerance, max_iterations=limit)
         if not held.converged:
             raise ConvergenceError(
@@ -266,11 +289,18 @@ def _settled(solve: Callable[[float, Foam], _Rest], first: _Rest) -> _Rest:
     return seen[alpha]
 
 
-def _near_rest(foam: Foam) -> Foam:
-    """A few free steps: more of them would let the cluster drift away."""
+def _near_rest(foam: Foam, point: Floats, arms: Floats) -> Foam:
+    """A few free steps; a cluster that drifts on the way is put back in its place and orientation."""
+    surface = foam.cell.surface
     for _ in range(APPROACH):
         rough = relax(foam, t1=False, max_iterations=2)
         foam = rough.foam
-        if max(rough.residual, rough.volume_error) < ROUGH:
+        moment, volume = volume_moment(foam, point)
+        if float(np.linalg.norm(moment)) > STRAY * volume * foam.bubble_size:
+            plane = _plane(foam, None)
+            cross = arms[:, 0] * plane[:, 1] - arms[:, 1] * plane[:, 0]
+            turn = float(np.arctan2(cross.sum(), (arms * plane).sum()))
+            foam = replace(foam, vertex_points=geodesic_chart(surface, point, plane, -turn))
+        elif max(rough.residual, rough.volume_error) < ROUGH:
             break
     return foam

@@ -131,7 +131,7 @@ def _gradients(foam: Foam, hold: Hold, volume: float, length: float) -> Floats:
     surface, network = foam.cell.surface, foam.network
     films, sign = outer_films(foam)
     rule = lobatto(foam.order + MORE)
-    tail, head, offsets = foam.vertex_points[network.tails[films]], None, foam.film_offsets[films]
+    offsets, tail = foam.film_offsets[films], foam.vertex_points[network.tails[films]]
     head = foam.vertex_points[network.heads[films]]
     curve = surface.arc_points(tail, head, offsets, rule.nodes)
     slope = np.einsum("kl,flx->fkx", rule.derivative, curve)
@@ -150,20 +150,20 @@ def _gradients(foam: Foam, hold: Hold, volume: float, length: float) -> Floats:
     n = foam.order + 3
     out = np.zeros((hold.count, n, network.n_films))
     stencil = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))
-    for row in range(n):
+    for k in range(n):
         moved = np.zeros_like(curve)
         for times, share in stencil:
             a, b, u = tail, head, offsets
-            if row < 4:
+            if k < 4:
                 step = np.zeros((len(films), 2))
-                step[:, row % 2] = times * DIFFERENCE * length
-                a = surface.retract(tail, step) if row < 2 else tail
-                b = surface.retract(head, step) if row >= 2 else head
+                step[:, k % 2] = times * DIFFERENCE * length
+                a = surface.retract(tail, step) if k < 2 else tail
+                b = surface.retract(head, step) if k >= 2 else head
             else:
                 u = offsets.copy()
-                u[:, row - 4] += times * DIFFERENCE
+                u[:, k - 4] += times * DIFFERENCE
             moved += share / DIFFERENCE * surface.arc_points(a, b, u, rule.nodes)
-        out[:2, row, films] = np.einsum("ifk,fkx,fkx->if", lever, moved, outward)
+        out[:2, k, films] = np.einsum("ifk,fkx,fkx->if", lever, moved, outward)
     if hold.arms is not None:
         a = hold.arms / (hold.arms**2).sum()
         pull = length * (a[:, :1] * hold.frame[1] - a[:, 1:] * hold.frame[0])
@@ -241,6 +241,7 @@ def relax_held(foam: Foam, hold: Hold, *, tolerance: float, max_iterations: int)
     scale = foam.tension * system.film_unit / system.mean_volume
     start = np.zeros(foam.n_bubbles) if foam.pressures is None else foam.pressures / scale
     state = State(network, foam.vertex_points, foam.film_offsets, start)
+    assert foam.exterior is not None
     volume = float(np.delete(foam.target_volumes, foam.exterior).sum())
     force = np.zeros(hold.count)
     length, unit = system.length, np.ones(hold.count)
@@ -306,7 +307,9 @@ def _step(
     free = kkt.step(lin.volume_fault)
     ways = [kkt.response(lin.loaded(part).condensed(positive=False)) for part in gradient]
     still = lin.loaded(np.zeros_like(lin.force)).condensed(positive=False)
-    ways += [kkt.response(still, np.bincount([pin], minlength=vertex.size).astype(np.float64)) for pin in pins]
+    ways += [
+        kkt.response(still, np.bincount([pin], minlength=vertex.size).astype(np.float64)) for pin in pins
+    ]
 
     def seen(step: Step) -> Floats:
         return np.concatenate([_inner(gradient, step, foam), step.vertices.ravel()[pins]])
@@ -315,7 +318,7 @@ def _step(
     response[count:, count:] -= np.eye(held)
     target = -seen(free)
     target[:count] -= values
-    change = np.linalg.lstsq(response, target, rcond=RANK)[0]
+    change: Floats = np.linalg.lstsq(response, target, rcond=RANK)[0]
     step = Step(
         free.vertices + sum(c * w.vertices for c, w in zip(change, ways, strict=True)),
         free.offsets + sum(c * w.offsets for c, w in zip(change, ways, strict=True)),
@@ -345,7 +348,7 @@ def _reaction(foam: Foam, hold: Hold, volume: float, force: Floats) -> tuple[Flo
         pull -= slope([work(end) for end in ends], h) * e
     if hold.arms is None:
         return pull, float("nan")
-    turns = [replace(hold, arms=hold.arms @ _rotation(1e-3 * t)) for t in (-2.0, -1.0, 1.0, 2.0)]
+    turns = [replace(hold, arms=hold.arms @ turn_by(1e-3 * t)) for t in (-2.0, -1.0, 1.0, 2.0)]
     normal = surface.normals(hold.point[None])[0]
     return pull - (pull @ normal) * normal, -slope([work(turn) for turn in turns], 1e-3)
 
@@ -361,6 +364,6 @@ def carried(surface_cell: HeleShawCell, hold: Hold, step: Floats) -> Hold:
     return replace(hold, point=point, frame=turned)
 
 
-def _rotation(angle: float) -> Floats:
+def turn_by(angle: float) -> Floats:
     """Turns plane vectors (n, 2) counter-clockwise from the right."""
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])

@@ -87,7 +87,8 @@ def ghosts(centres: Floats) -> Floats:
     radius = float(np.linalg.norm(centres, axis=1).max()) + 4.0 * SPACING
     grid = _lattice(radius / SPACING + 2.0) + centres[0]
     away = cKDTree(centres).query(grid)[0]
-    return grid[(away > 0.7 * SPACING) & (away < 3.5 * SPACING)]
+    out: Floats = grid[(away > 0.7 * SPACING) & (away < 3.5 * SPACING)]
+    return out
 
 
 def planar_layout(centres: Floats, around: Floats, max_turn: float) -> Layout:
