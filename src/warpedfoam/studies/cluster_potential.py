@@ -24,18 +24,15 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ConvergenceError, TopologyError
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.periodic import nearest_image
-from warpedfoam.relax import relax
 from warpedfoam.studies.cluster import cluster_clearance, cluster_foam, geodesic_chart
 from warpedfoam.studies.held_cluster import HeldCluster, Hold, relax_held, turn_by, volume_moment
 
-#: Residual and volume error from which a cluster is held, and how often two free steps bring it there.
-ROUGH, APPROACH = 0.01, 40
-#: Free clusters are put back when they are this far from their place, in bubble sizes.
-STRAY = 0.5
 #: Torques below this share of the energy are none; where there is none, a turn tells whether it stays so.
 NO_TORQUE, PROBE = 1e-9, 0.13
 #: Steps in which a free orientation follows its torque, how many, and how well it is found; radians.
 TURN, MOST_TURNS, ANGLE = 0.25, 30, 1e-6
+#: A cluster turned by less than this starts from where it was, others from the layout; radians.
+NEAR = 0.03
 #: Clusters whose parts come nearer than this, in bubble sizes, touch themselves.
 TOUCHING = 0.02
 
@@ -238,11 +235,14 @@ def _held_at(
     surface = shape.cell.surface
     frame = surface.vertex_frames(point[None])[0]
     arms = plane * (shape.network.vertex_degrees == 3)[:, None]
-    placed = geodesic_chart(surface, point, plane, angle)
-    start = _near_rest(replace(shape, vertex_points=placed, pressures=None), point, arms @ turn_by(angle))
     near = np.round(point, 3).tolist()
 
-    def solve(alpha: float, foam: Foam) -> _Rest:
+    def solve(alpha: float, known: _Rest | None) -> _Rest:
+        if known is not None and abs(known.angle - alpha) < NEAR:
+            foam = known.held.foam
+        else:
+            placed = geodesic_chart(surface, point, plane, alpha)
+            foam = replace(shape, vertex_points=placed, pressures=None)
         turned = arms @ turn_by(alpha) if arms.any() else None
         held = relax_held(foam, Hold(point, frame, turned), tolerance=tolerance, max_iterations=limit)
         if not held.converged:
@@ -252,7 +252,7 @@ def _held_at(
             )
         return _Rest(held, alpha, held.is_minimum)
 
-    rest = solve(angle, start)
+    rest = solve(angle, None)
     if not both and arms.any():
         rest = _settled(solve, rest)
     if cluster_clearance(rest.held.foam) < TOUCHING:
@@ -260,17 +260,17 @@ def _held_at(
     return rest
 
 
-def _settled(solve: Callable[[float, Foam], _Rest], first: _Rest) -> _Rest:
+def _settled(solve: Callable[[float, _Rest | None], _Rest], first: _Rest) -> _Rest:
     """Follow the torque to where it vanishes; stay where it makes no difference."""
     small = NO_TORQUE * first.held.foam.energy
     here = first
     if abs(first.held.torque) <= small:
-        here = solve(first.angle + PROBE, first.held.foam)
+        here = solve(first.angle + PROBE, first)
         if here.held.torque <= small:
             return first
     way = np.sign(here.held.torque)
     for _ in range(MOST_TURNS):
-        there = solve(here.angle + way * TURN, here.held.foam)
+        there = solve(here.angle + way * TURN, here)
         if there.held.torque * way <= 0.0:
             break
         here = there
@@ -281,26 +281,9 @@ def _settled(solve: Callable[[float, Foam], _Rest], first: _Rest) -> _Rest:
     def torque(alpha: float) -> float:
         if alpha not in seen:
             nearest = min(seen, key=lambda known: abs(known - alpha))
-            seen[alpha] = solve(alpha, seen[nearest].held.foam)
+            seen[alpha] = solve(alpha, seen[nearest])
         return seen[alpha].held.torque
 
     alpha = float(brentq(torque, here.angle, there.angle, xtol=ANGLE, rtol=1e-12))
     torque(alpha)
     return seen[alpha]
-
-
-def _near_rest(foam: Foam, point: Floats, arms: Floats) -> Foam:
-    """A few free steps; a cluster that drifts on the way is put back in its place and orientation."""
-    surface = foam.cell.surface
-    for _ in range(APPROACH):
-        rough = relax(foam, t1=False, max_iterations=2)
-        foam = rough.foam
-        moment, volume = volume_moment(foam, point)
-        if float(np.linalg.norm(moment)) > STRAY * volume * foam.bubble_size:
-            plane = _plane(foam, None)
-            cross = arms[:, 0] * plane[:, 1] - arms[:, 1] * plane[:, 0]
-            turn = float(np.arctan2(cross.sum(), (arms * plane).sum()))
-            foam = replace(foam, vertex_points=geodesic_chart(surface, point, plane, -turn))
-        elif max(rough.residual, rough.volume_error) < ROUGH:
-            break
-    return foam

@@ -11,10 +11,11 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.relax.driver import EXACT_BELOW, SOFTNESS, VOLUME_STEP
 from warpedfoam.relax.held import held_vertices, moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
-from warpedfoam.relax.system import Linearised, State, Step, System, rigid_modes
+from warpedfoam.relax.system import Linearised, State, Step, System, one_ring, rigid_modes
 
 #: Order of the rays from the held point to the outer films, and by how much rays outnumber a film's nodes.
 RADIAL, MORE = 14, 6
@@ -233,7 +234,8 @@ def relax_held(foam: Foam, hold: Hold, *, tolerance: float, max_iterations: int)
 
     The matrix is factored with stiffnesses on a few vertex unknowns, which fix the motions that the
     constraints forbid, and these are taken out again together with the border (Woodbury). Second
-    derivatives of the constraints are left out: they come times their small multipliers.
+    derivatives of the constraints are left out: they come times their small multipliers. Far from rest
+    the steps are shifted as in `warpedfoam.relax`.
     """
     surface, network = foam.cell.surface, foam.network
     method = factoriser("superlu", foam.n_bubbles)
@@ -295,18 +297,29 @@ def _step(
     foam: Foam, lin: Linearised, gradient: Floats, values: Floats, pins: np.ndarray
 ) -> tuple[Step, Floats, bool]:
     """Newton step, change of the constraints' forces, and whether the state is a minimum under them."""
-    network = foam.network
+    network, shares = foam.network, lin.system.shares
     vertex = np.zeros(2 * network.n_vertices)
-    vertex[pins] = 1.0
     pressure = np.zeros(network.n_bubbles)
     assert foam.exterior is not None
-    pressure[foam.exterior] = 1.0
-    condensed = lin.condensed(positive=False)
+    fault = lin.volume_fault
+    rough = lin.residuals.force > EXACT_BELOW or float(np.abs(fault / shares).max()) > EXACT_BELOW
+    if rough:
+        # as in `relax` far from rest: shifted, soft volumes, positive blocks
+        residual = one_ring(network, lin.residuals.vertex)
+        shift = np.maximum(1e-5, residual / 0.15 * np.minimum(1.0, residual / 0.5))
+        vertex += np.repeat(shift, 2)
+        pressure = SOFTNESS * shares**1.5
+        most = VOLUME_STEP * np.maximum(shares, lin.volumes)
+        fault = np.clip(fault, -most, most)
+    else:
+        pressure[foam.exterior] = 1.0
+    vertex[pins] += 1.0
+    condensed = lin.condensed(positive=rough)
     kkt = KKT(lin, condensed, vertex, pressure)
     count, held = len(gradient), len(pins)
-    free = kkt.step(lin.volume_fault)
-    ways = [kkt.response(lin.loaded(part).condensed(positive=False)) for part in gradient]
-    still = lin.loaded(np.zeros_like(lin.force)).condensed(positive=False)
+    free = kkt.step(fault)
+    ways = [kkt.response(lin.loaded(part).condensed(positive=rough)) for part in gradient]
+    still = lin.loaded(np.zeros_like(lin.force)).condensed(positive=rough)
     ways += [
         kkt.response(still, np.bincount([pin], minlength=vertex.size).astype(np.float64)) for pin in pins
     ]
@@ -318,7 +331,7 @@ def _step(
     response[count:, count:] -= np.eye(held)
     target = -seen(free)
     target[:count] -= values
-    change: Floats = np.linalg.lstsq(response, target, rcond=RANK)[0]
+    change = np.asarray(np.linalg.lstsq(response, target, rcond=RANK)[0], dtype=np.float64)
     step = Step(
         free.vertices + sum(c * w.vertices for c, w in zip(change, ways, strict=True)),
         free.offsets + sum(c * w.offsets for c, w in zip(change, ways, strict=True)),
