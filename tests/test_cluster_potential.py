@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,6 +161,19 @@ def test_a_cluster_of_the_users_own() -> None:
     for foam in found.foams:
         np.testing.assert_allclose(foam.bubble_volumes[:4], [0.4, 0.5, 0.6, 0.5], rtol=1e-10)
         assert np.array_equal(foam.network.next, relaxed.foam.network.next)
+
+
+def test_the_page() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "clusters.md").read_text(encoding="utf-8")
+    space: dict[str, object] = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+        exec(compile(block, "clusters.md", "exec"), space)
+    assert space["relaxed"].converged  # type: ignore[attr-defined]
+    assert space["exterior"] == 7
+    # as printed on the page
+    assert space["difference"] == pytest.approx(0.025414921, abs=2e-9)
+    assert "| 7 | 0.025414921 |" in text
+    assert space["force"][1] < 0.0  # type: ignore[index]
 
 
 class TestConstraints:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from warpedfoam.arrays import (
     Bools,
@@ -262,6 +261,8 @@ def _held_at(
 
 def _settled(solve: Callable[[float, _Rest | None], _Rest], first: _Rest) -> _Rest:
     """Follow the torque to where it vanishes; stay where it makes no difference."""
+    from scipy.optimize import brentq
+
     small = NO_TORQUE * first.held.foam.energy
     here = first
     if abs(first.held.torque) <= small:
