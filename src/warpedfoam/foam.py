@@ -69,6 +69,10 @@ class Foam:
         Pressures found by `warpedfoam.relax`.
     seed : int, optional
         The random seed that the foam came from.
+    exterior : int, optional
+        The bubble that is the rest of the cell round open clusters: at pressure 0, with the volume that
+        is left. By default the only bubble that is no disk, if there is just one; round one cluster on a
+        sphere the exterior is a disk too and must be named.
 
     Raises
     ------
@@ -87,6 +91,7 @@ class Foam:
     tension: float
     pressures: Floats | None
     seed: int | None
+    exterior: int | None
 
     def __init__(
         self,
@@ -99,6 +104,7 @@ class Foam:
         tension: float = 1.0,
         pressures: ArrayLike | None = None,
         seed: int | None = None,
+        exterior: int | None = None,
     ) -> None:
         if not isinstance(cell, HeleShawCell):
             raise TypeError(f"cell must be a HeleShawCell, got {type(cell).__name__}")
@@ -109,6 +115,11 @@ class Foam:
         put(self, "network", network)
         put(self, "tension", as_number(tension, "tension", positive=True))
         put(self, "seed", None if seed is None else as_integer(seed, "seed", minimum=0))
+        if exterior is not None:
+            exterior = as_integer(exterior, "exterior", minimum=0, maximum=network.n_bubbles - 1)
+        elif (odd := np.flatnonzero(network.bubble_euler != 1)).size == 1:
+            exterior = int(odd[0])
+        put(self, "exterior", exterior)
         chi = cell.surface.euler_characteristic
         if network.euler_characteristic != chi:
             raise TopologyError(
@@ -138,8 +149,8 @@ class Foam:
             targets = self.bubble_volumes
         else:
             targets = as_floats(target_volumes, "target_volumes", (network.n_bubbles,))
-        # the loops of an exterior that is no disk do not tell its volume
-        disks = bool((network.bubble_euler == 1).all())
+        # the loops of a bubble that is no disk do not tell its volume; an exterior has what is left
+        disks = bool((network.bubble_euler == 1).all()) and exterior is None
         allowed = cell.surface.precision * cell.volume
         # a draft is enough to see that nothing is amiss
         draft = bubble_integrals(cell, network, points, offsets, replace(cell.layer, rays=2))
@@ -177,11 +188,14 @@ class Foam:
         """Rim vertices lie on the rim, and walls go once round each of its loops."""
         network, rim, size = self.network, self.cell.surface.rim, self.cell.surface.size
         n_loops = 0 if rim is None else rim.n_loops
-        if len(network.rim_cycles) != n_loops:
+        # an exterior may hold whole loops of the rim on which no film ends
+        if len(network.rim_cycles) != n_loops and not (
+            self.exterior is not None and len(network.rim_cycles) < n_loops
+        ):
             raise TopologyError(
                 f"the network's walls make {len(network.rim_cycles)} loops, the surface's rim has {n_loops}"
             )
-        if rim is None:
+        if rim is None or not len(network.rim_vertices):
             return
         at = self.vertex_points[network.rim_vertices]
         away = np.linalg.norm(rim.nearest(at) - at, axis=1)
@@ -243,8 +257,12 @@ class Foam:
 
     @property
     def bubble_size(self) -> float:
-        """ℓ = sqrt(area of the surface / number of bubbles), the foam's unit of length."""
-        return float(np.sqrt(self.cell.surface.area / self.n_bubbles))
+        """ℓ = sqrt(area of the surface / number of bubbles), the unit of length; an exterior left out."""
+        area = self.cell.surface.area
+        if self.exterior is None:
+            return float(np.sqrt(area / self.n_bubbles))
+        held = np.delete(self.target_volumes, self.exterior)
+        return float(np.sqrt(area * held.mean() / self.cell.volume))
 
     @property
     def film_ends(self) -> tuple[Floats, Floats]:
@@ -417,7 +435,11 @@ class Foam:
         return frozen(self.cell.surface.arc_measure(tail, head, self.film_offsets, layer))
 
     def _inside(self, layer: Layer) -> Floats:
-        return frozen(bubble_integrals(self.cell, self.network, self.vertex_points, self.film_offsets, layer))
+        inside = bubble_integrals(self.cell, self.network, self.vertex_points, self.film_offsets, layer)
+        if self.exterior is not None:
+            inside[self.exterior] = 0.0
+            inside[self.exterior] = self.cell.surface.integral(layer) - inside.sum()
+        return frozen(inside)
 
 
 def bubble_integrals(

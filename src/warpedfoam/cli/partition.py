@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from warpedfoam.analysis import point_group
-from warpedfoam.studies.options import SurfaceOptions, options_from
 from warpedfoam.cli.progress import Progress
 from warpedfoam.io import save, versions, write_columns_csv, write_record
 from warpedfoam.studies import MinimalPartition, minimal_partition
+from warpedfoam.studies.options import SurfaceOptions, options_from
 
 FOAM, TRIES, PICTURE, RECORD, STATE = "partition.npz", "tries.csv", "partition.png", "partition.json", "state"
 

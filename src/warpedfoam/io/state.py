@@ -105,6 +105,7 @@ def arrays_of(foam: Foam) -> Arrays:
         "n_heights": foam.cell.n_heights,
         "tension": foam.tension,
         "seed": foam.seed,
+        "exterior": foam.exterior,
         "pressures": foam.pressures is not None,
     }
     text = json.dumps(header, allow_nan=False, sort_keys=True)
@@ -245,6 +246,7 @@ def foam_of(arrays: Arrays, known: Mapping[str, type]) -> Foam:
         tension=header["tension"],
         pressures=arrays["pressures"] if header["pressures"] is True else None,
         seed=header["seed"],
+        exterior=header.get("exterior"),
     )
 
 

@@ -79,13 +79,17 @@ def t1_sites(network: CellNetwork, films: Ints) -> T1Sites:
 
 
 def allowed(network: CellNetwork, sites: T1Sites) -> Bools:
-    """Whether each T1 leaves a network: four different disks, losers of at least four sides, no marker."""
-    sides = network.sides[sites.bubbles[:, :2]].min(axis=1) >= 4
+    """Whether each T1 leaves a network: four different bubbles, losers of at least four sides, no marker.
+
+    What is no disk, such as an exterior, may be any of the four: its loop only loses or gains one film,
+    and having different neighbours at the film's ends keeps two films at least.
+    """
+    beside = sites.bubbles[:, :2]
+    sides = ((network.sides[beside] >= 4) | (network.bubble_euler[beside] != 1)).all(axis=1)
     ordered = np.sort(sites.bubbles, axis=1)
     distinct = (np.diff(ordered, axis=1) > 0).all(axis=1)
     threefold = (network.vertex_degrees[network.origin[np.stack([sites.a, sites.c])]] == 3).all(axis=0)
-    disks = (network.bubble_euler[sites.bubbles] == 1).all(axis=1)
-    out: Bools = sides & distinct & threefold & disks
+    out: Bools = sides & distinct & threefold
     return out
 
 
@@ -106,15 +110,15 @@ def rewire(network: CellNetwork, films: ArrayLike) -> CellNetwork:
     Raises
     ------
     TopologyError
-        If a film may not turn (its four bubbles are not four different disks, a loser has fewer than
-        four sides, an end is a marker), or two of the T1s share a bubble.
+        If a film may not turn (its four bubbles are not four different ones, a loser is a disk of fewer
+        than four sides, an end is a marker), or two of the T1s share a bubble.
     """
     chosen = as_indices(films, "films", (None,), below=network.n_films)
     sites = t1_sites(network, chosen)
     fine = allowed(network, sites)
     if not fine.all():
         raise TopologyError(
-            f"film {int(chosen[~fine][0])} cannot turn: its four bubbles must be different disks, "
+            f"film {int(chosen[~fine][0])} cannot turn: its four bubbles must differ, "
             "the two beside it must have at least four sides, and both its ends must be threefold"
         )
     if len(np.unique(sites.bubbles)) != sites.bubbles.size:

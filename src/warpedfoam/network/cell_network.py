@@ -173,7 +173,9 @@ class CellNetwork:
         """Topological charges q = 6 − films − 2 walls, (n_bubbles,): 6 − n inside.
 
         They add up to 6 χ if all bubbles are disks. A wall counts twice since films meet it at 90°, not
-        120°: a bubble of three films and a wall is at home on a straight rim.
+        120°: a bubble of three films and a wall is at home on a straight rim. A film that faces an exterior
+        is a side like any other: with one taken off for each such film, the charges of a cluster's bubbles
+        add up to 6, whatever its outline.
         """
         return frozen(6 - self.sides - self.wall_counts)
 

@@ -142,10 +142,12 @@ def relax(
         require_lines(foam)
     method = factoriser(solver, foam.n_bubbles)
     start = foam.with_order(p)
-    system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles)
+    system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles, foam.exterior)
     clock = Stopwatch(system.timings)
     scale = foam.tension * system.film_unit / system.mean_volume
     pressures = np.zeros(foam.n_bubbles) if foam.pressures is None else foam.pressures / scale
+    if foam.exterior is not None:
+        pressures = pressures - pressures[foam.exterior]
     state = State(start.network, start.vertex_points, start.film_offsets, pressures)
     run = _Run(
         system,
@@ -162,7 +164,8 @@ def relax(
         run.state = state
         run.events.clear()
     state = run.state
-    pressures = frozen((state.pressures - state.pressures.mean()) * scale)
+    zero = state.pressures.mean() if foam.exterior is None else state.pressures[foam.exterior]
+    pressures = frozen((state.pressures - zero) * scale)
     final = replace(
         start,
         network=state.network,
@@ -337,7 +340,8 @@ def _kkt(run: _Run, lin: Linearised, condensed: Condensed, shift: float) -> KKT:
     vertex = np.full(2 * network.n_vertices, shift)
     vertex[run.pins] += 1.0
     pressure = np.zeros(network.n_bubbles)
-    pressure[0] = 1.0  # the volumes add up to the cell's: one constraint is redundant
+    # the volumes add up to the cell's: one constraint is redundant, the exterior's if there is one
+    pressure[run.system.exterior or 0] = 1.0
     return KKT(lin, condensed, vertex, pressure)
 
 

@@ -7,23 +7,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpedfoam.arrays import Floats, Ints
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.moves.t1 import outward_tangents
 from warpedfoam.network import CellNetwork
 from warpedfoam.surfaces.protocol import Surface
 
+#: Stiffness of the links that space markers, and of the hold that keeps a ring of them from turning.
+LINK, GRIP = 1e-2, 1e-7
+
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Vertices (k,) and the unit directions (k, 2), in their frames, in which they do not move.
+    """Vertices (k,) and the unit directions (k, 2), in their frames, in which no force moves them.
 
     ``share`` (k,) is one film's share of the stiffness that holds a vertex; ``turning`` (k,) how fast the
-    line on which it moves turns towards the direction, κ_g of a rim.
+    line on which it moves turns towards the direction, κ_g of a rim. ``linked`` (m,) are films that end in
+    a marker and ``links`` (4, m) the stretch of their chords by steps of their ends: a weak stiffness on it
+    makes markers follow their neighbours when a bubble moves as a whole, along their films too.
     """
 
     vertices: Ints
     directions: Floats
     share: Floats
     turning: Floats
+    linked: Ints
+    links: Floats
 
 
 def held_vertices(surface: Surface, network: CellNetwork, points: Floats, offsets: Floats) -> Held | None:
@@ -32,25 +40,35 @@ def held_vertices(surface: Surface, network: CellNetwork, points: Floats, offset
     A marker that slid along its film would exploit the quadrature; a rim vertex leaves the surface.
     """
     parts = []
+    linked, links = np.zeros(0, dtype=np.int64), np.zeros((4, 0))
     if len(network.markers):
         along = marker_tangents(surface, network, points, offsets)
         count = len(along)
-        parts.append(Held(network.markers, along, np.full(count, 0.5), np.zeros(count)))
+        parts.append((network.markers, along, np.full(count, 0.5 * GRIP), np.zeros(count)))
+        linked, links = _links(surface, network, points)
     if surface.rim is not None and len(network.rim_vertices):
         at = points[network.rim_vertices]
         places = surface.rim.locate(at)
         inward = surface.rim.frame(*places)[1]
         flat = np.einsum("mij,mj->mi", surface.vertex_frames(at), inward)
         flat /= np.linalg.norm(flat, axis=1, keepdims=True)
-        parts.append(Held(network.rim_vertices, flat, np.ones(len(at)), surface.rim.curvatures(*places)))
+        parts.append((network.rim_vertices, flat, np.ones(len(at)), surface.rim.curvatures(*places)))
     if not parts:
         return None
-    return Held(
-        np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.directions for p in parts]),
-        np.concatenate([p.share for p in parts]),
-        np.concatenate([p.turning for p in parts]),
-    )
+    vertices, directions, share, turning = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Held(vertices, directions, share, turning, linked, links)
+
+
+def _links(surface: Surface, network: CellNetwork, points: Floats) -> tuple[Ints, Floats]:
+    """Films that end in a marker, and how steps of their ends stretch their chords, (4, m)."""
+    degrees = network.vertex_degrees
+    film = np.flatnonzero((degrees[network.tails] == 2) | (degrees[network.heads] == 2))
+    tail, head = points[network.tails[film]], points[network.heads[film]]
+    chord = nearest_image(head - tail, surface.period)
+    chord = chord / np.maximum(np.linalg.norm(chord, axis=1, keepdims=True), 1e-300)
+    ends = [-np.einsum("fix,fx->if", surface.vertex_frames(tail), chord)]
+    ends.append(np.einsum("fix,fx->if", surface.vertex_frames(head), chord))
+    return film, np.concatenate(ends)
 
 
 def hold(held: Held, network: CellNetwork, length: float, arrays: tuple[Floats, Floats, Floats]) -> None:
@@ -75,6 +93,9 @@ def hold(held: Held, network: CellNetwork, length: float, arrays: tuple[Floats, 
         block[:, rows] = np.einsum("kjf,jif->kif", block[:, rows], project)
         block[rows, rows] += held.share[index] * t[:, None] * t[None] + work * project
         hessian[:, :, film] = block
+    if held.linked.size:
+        pull = LINK * held.links[:, None] * held.links[None]
+        hessian[:4, :4, held.linked] += pull
 
 
 def moved_points(surface: Surface, network: CellNetwork, points: Floats, steps: Floats) -> Floats:

@@ -58,11 +58,22 @@ class KKT:
 
     def step(self, volume_fault: Floats) -> Step:
         """Solve for (−r, V − V*) and recover the offsets."""
-        network, condensed = self._lin.state.network, self._condensed
-        rhs = self._pattern.gather(condensed.rhs[_ROWS] * _SIGN[:, None])
-        split = 2 * network.n_vertices
+        rhs = self._pattern.gather(self._condensed.rhs[_ROWS] * _SIGN[:, None])
+        split = 2 * self._lin.state.network.n_vertices
         rhs[:split] = self._lin.without_rigid(rhs[:split])
         rhs[split:] += volume_fault
+        return self._recovered(rhs, self._condensed)
+
+    def response(self, condensed: Condensed, vertices: Floats | None = None) -> Step:
+        """Solve for the forces eliminated in ``condensed`` and those on ``vertices`` (2 n_vertices,)."""
+        rhs = self._pattern.gather(condensed.rhs[_ROWS] * _SIGN[:, None])
+        if vertices is not None:
+            rhs[: vertices.size] += vertices
+        return self._recovered(rhs, condensed)
+
+    def _recovered(self, rhs: Floats, condensed: Condensed) -> Step:
+        network = self._lin.state.network
+        split = 2 * network.n_vertices
         solution = self._solve(rhs)
         clock = Stopwatch(self._timings)
         dv, dp = solution[:split].reshape(-1, 2), solution[split:]

@@ -21,7 +21,8 @@ class Relaxation:
     energy : float
         γ Σ film areas.
     pressures : (n_bubbles,) array
-        Multipliers of the volumes, mean zero (only differences matter on a closed surface).
+        Multipliers of the volumes, mean zero (only differences matter on a closed surface); an exterior
+        has pressure 0.
     residual : float
         Largest projected force on a vertex or film node, in units of γ d.
     volume_error : float

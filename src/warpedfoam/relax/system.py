@@ -6,10 +6,13 @@ are vertex steps, film offsets and pressures; the offsets are eliminated film by
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from warpedfoam.arrays import Floats, Ints
 from warpedfoam.cell import HeleShawCell
@@ -79,12 +82,23 @@ class System:
     """Builds and solves the Newton systems of one foam, and keeps the time they take."""
 
     def __init__(
-        self, cell: HeleShawCell, targets: Floats, order: int, factoriser: Factoriser, n_bubbles: int
+        self,
+        cell: HeleShawCell,
+        targets: Floats,
+        order: int,
+        factoriser: Factoriser,
+        n_bubbles: int,
+        exterior: int | None = None,
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
+        self.exterior = exterior
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
-        self.film_unit = float(cell.layer.shares.sum()) * self.length
         self.mean_volume = float(targets.mean())
+        if exterior is not None:
+            # the clusters set the scale, not the cell round them
+            self.mean_volume = float(np.delete(targets, exterior).mean())
+            self.length = float(np.sqrt(cell.surface.area * self.mean_volume / cell.volume))
+        self.film_unit = float(cell.layer.shares.sum()) * self.length
         self.shares = targets / self.mean_volume
         self.invariant = cell.surface.precision <= INVARIANT
         self.rule = lobatto(order)
@@ -153,11 +167,24 @@ class Linearised:
         self.volumes = volumes / system.mean_volume
         # one constraint is redundant: what all volumes together are off by (round-off, if nothing has
         # slipped) is shared out, or a single bubble would bear the round-off of all
-        excess = float(self.volumes.sum() / system.shares.sum())
-        self.slip = abs(excess - 1.0)
+        excess, self.slip = self._excess()
         self.volume_fault = self.volumes - excess * system.shares
         relative = np.abs(self.volume_fault) / system.shares
         self.residuals = self._residuals(float(relative.max()))
+
+    def _excess(self) -> tuple[float, float]:
+        """All volumes over what they should be, and how far that is off; an exterior takes the rest."""
+        system = self.system
+        total, loops = float(system.shares.sum()), float(self.volumes.sum())
+        if system.exterior is None:
+            return loops / total, abs(loops / total - 1.0)
+        volumes = self.volumes
+        volumes[system.exterior] = 0.0
+        clusters = float(volumes.sum())
+        volumes[system.exterior] = total - clusters
+        # run the other way round, the exterior's loops hold the clusters, or all but them
+        fault = min(abs(loops), abs(loops - total)) if system.invariant else 0.0
+        return 1.0, fault / max(clusters, 1e-300)
 
     def _residuals(self, volume_error: float) -> Residuals:
         network = self.state.network
@@ -178,6 +205,14 @@ class Linearised:
         if not np.isfinite(self.hessian).all() or not np.isfinite(force) or not np.isfinite(volume_error):
             force = np.inf
         return Residuals(at_vertex, self.volume_fault, force, volume_error)
+
+    def loaded(self, forces: Floats) -> Linearised:
+        """The same state under ``forces`` (p + 3, F) in place of its own; Hessian and volumes are shared."""
+        other = copy(self)
+        other.force = forces
+        relative = np.abs(self.volume_fault) / self.system.shares
+        other.residuals = other._residuals(float(relative.max()))
+        return other
 
     def without_rigid(self, forces: Floats) -> Floats:
         """Vertex forces (2 n_vertices,) without their rigid part, where that is no real force."""
@@ -224,8 +259,22 @@ def one_ring(network: CellNetwork, values: Floats) -> Floats:
 
 
 def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
-    """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do."""
+    """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do.
+
+    Parts of a foam that no films join move on their own, and turn where the surface is flat.
+    """
     modes = cell.surface.rigid_motions(state.points)
+    network = state.network
+    if (network.bubble_euler != 1).any() or len(network.markers):
+        links = coo_array(
+            (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
+        )
+        count, part = connected_components(links, directed=False)
+        if cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
+            turning = np.cross(cell.surface.normals(state.points), state.points)
+            modes = np.concatenate([modes, turning[None]])
+        own = part == np.arange(count)[:, None]
+        modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     held = held_vertices(cell.surface, state.network, state.points, state.offsets)

@@ -1,7 +1,9 @@
-"""Studies: circles, single bubbles and their potential, annealing and least partitions, ensembles."""
+"""Studies: circles, single bubbles, clusters, their potentials, annealing, least partitions, ensembles."""
 
 from warpedfoam.studies.annealing import Annealing, AnnealingHistory, anneal
 from warpedfoam.studies.bubble import BubbleBetweenPlates, bubble_between_plates
+from warpedfoam.studies.cluster import cluster_clearance, cluster_foam
+from warpedfoam.studies.cluster_potential import ClusterPotential, cluster_potential
 from warpedfoam.studies.ensemble import Ensemble, run_ensemble
 from warpedfoam.studies.geodesic_circle import GeodesicCircle, geodesic_circle
 from warpedfoam.studies.partition import MinimalPartition, PartitionTry, minimal_partition
@@ -18,6 +20,7 @@ __all__ = [
     "Annealing",
     "AnnealingHistory",
     "BubbleBetweenPlates",
+    "ClusterPotential",
     "Ensemble",
     "GeodesicCircle",
     "GeometricPotential",
@@ -27,6 +30,9 @@ __all__ = [
     "ThomsonPoints",
     "anneal",
     "bubble_between_plates",
+    "cluster_clearance",
+    "cluster_foam",
+    "cluster_potential",
     "drift_path",
     "geodesic_circle",
     "geometric_potential",
