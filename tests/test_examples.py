@@ -27,6 +27,7 @@ def example(name: str) -> ModuleType:
 def test_every_example_is_tested() -> None:
     assert {p.stem for p in EXAMPLES.glob("*.py")} == {
         "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply", "04_defects_on_tori",
+        "05_bubble_on_a_torus",
     }  # fmt: skip
 
 
@@ -62,3 +63,12 @@ def test_defects_on_tori(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         "charge_1.5.png", "charge_3.png", "charge_6.png", "defects.png",
     }  # fmt: skip
     assert len(capsys.readouterr().out.splitlines()) == 7
+
+
+def test_bubble_on_a_torus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    inner, apart = example("05_bubble_on_a_torus").main(3, tmp_path)
+    # an independent spectral solution gave 1.000791843
+    assert inner == pytest.approx(1.000791843, abs=1e-8)
+    assert apart < 2e-6
+    assert {p.name for p in tmp_path.iterdir()} == {"torus_energy.png", "torus_energy.csv"}
+    assert len(capsys.readouterr().out.splitlines()) == 4

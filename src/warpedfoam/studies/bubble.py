@@ -20,7 +20,7 @@ ANGLES, RESOLVED = (17, 25, 37, 55), 1e-9
 ROUGH = 1e-4
 #: Radial nodes: this many, and one more for so many angles more.
 RADIAL, ANGLES_A_RADIAL = 8, 6
-#: Least radius of a bubble in sizes of the surface: below, places have no digits left to tell its nodes apart.
+#: Least radius of a bubble in sizes of the surface: below, round-off hides its nodes.
 LEAST_RADIUS = 1e-8
 #: Ways to hold a bubble.
 HOLDS = ("centroid", "projection", "free")
@@ -155,7 +155,7 @@ def bubble_between_plates(
     Raises
     ------
     TypeError, ValueError
-        For bad input; if ``position`` is not near the surface or beyond its rim, or the bubble is too large
+        For bad input; if ``position`` is not near the surface, or beyond its rim, or the bubble is too large
         for its surface or reaches over its rim.
 
     Notes
@@ -273,8 +273,8 @@ def _require_inside_rim(task: _Task, held: HeldBubble, solved: Solved) -> None:
         away = float(np.linalg.norm(surface.rim.nearest(origin[None])[0] - origin)) if surface.rim else 0.0
         raise OverRim(
             f"volume {task.volume:g} is too large so close to the rim: the bubble at "
-            f"{origin.round(4).tolist()} has a radius of about {task.radius:.3g} and would reach over the rim, "
-            f"{away:.3g} away; hold it farther from the rim or take a smaller volume"
+            f"{origin.round(4).tolist()} has a radius of about {task.radius:.3g} and would reach over "
+            f"the rim, {away:.3g} away; hold it farther from the rim or take a smaller volume"
         )
 
 

@@ -122,8 +122,8 @@ def geodesic_circle(
         If ``surface`` is not a surface, or an argument has the wrong type.
     ValueError
         If an argument is out of range; if "jacobi" meets a conjugate point before ρ or its circle crosses
-        itself; if the points at distance ρ on the mesh do not make one closed curve; if a geodesic of length ρ
-        leaves the surface over its rim.
+        itself; if the points at distance ρ on the mesh do not make one closed curve; if a geodesic of
+        length ρ leaves the surface over its rim.
     ResolutionError
         If the mesh is too coarse for the radius, or the spacing too fine for memory.
     ConvergenceError

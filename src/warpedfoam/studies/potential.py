@@ -129,7 +129,8 @@ def geometric_potential(
     Raises
     ------
     TypeError, ValueError
-        For bad input; if the bubble is too large for its surface somewhere, or reaches over the rim everywhere.
+        For bad input; if the bubble is too large for its surface somewhere, or reaches over the rim
+        everywhere.
 
     Notes
     -----

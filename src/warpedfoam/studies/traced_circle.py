@@ -11,7 +11,7 @@ trapezoid rule in θ converges faster than any power, because m is smooth and pe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -149,7 +149,7 @@ def require_off_rim(surface: Surface, centre: Floats, radius: float) -> None:
         _trace(surface, centre, surface.vertex_frames(centre[None])[0], angles, radius, RIM_TOLERANCE)
 
 
-def _require_inside_rim(surface: Surface, centre: Floats, radius: float, solver: DOP853) -> None:
+def _require_inside_rim(surface: Surface, centre: Floats, radius: float, solver: DOP853[Any]) -> None:
     """Look at the last step of every geodesic."""
     way = solver.dense_output()
     for place in np.linspace(solver.t_old, solver.t, RIM_PLACES + 1)[1:]:
