@@ -1,4 +1,5 @@
-"""The table of bad calls, and what they work on; the rows are in `bad_geometry` and `bad_foams`."""
+"""The table of bad calls, and what they work on; the rows are in `bad_geometry`,
+`bad_foams` and `bad_bubbles`."""
 
 from __future__ import annotations
 

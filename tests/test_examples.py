@@ -38,6 +38,7 @@ def test_every_example_is_tested() -> None:
         "01_first_foam_torus", "02_defects_on_a_sphere", "03_export_ply", "04_defects_on_tori",
         "05_polydispersity_ensemble",
         "06_scars_on_spheres",
+        "07_bubble_on_a_torus",
     }  # fmt: skip
     assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
@@ -109,3 +110,12 @@ def test_scars_on_spheres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert row["excess pairs"] <= 2
     assert row["energy"] <= row["start energy"]
     assert (tmp_path / "scars.png").stat().st_size > 10_000
+
+
+def test_bubble_on_a_torus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    inner, apart = example("07_bubble_on_a_torus").main(3, tmp_path)
+    # an independent spectral solution gave 1.000791843
+    assert inner == pytest.approx(1.000791843, abs=1e-8)
+    assert apart < 2e-6
+    assert {p.name for p in tmp_path.iterdir()} == {"torus_energy.png", "torus_energy.csv"}
+    assert len(capsys.readouterr().out.splitlines()) == 4

@@ -101,7 +101,7 @@ def test_four_sweeps_of_many_t1s_are_none(name):
     sites = every_site(net)
     fine = allowed(net, sites) & (net.sides[sites.bubbles].min(axis=1) >= 5)
     films = np.flatnonzero(fine)
-    chosen = films[independent(t1_sites(net, films), np.random.default_rng(0).random(len(films)))]
+    chosen = films[independent(t1_sites(net, films).bubbles, np.random.default_rng(0).random(len(films)))]
     assert len(chosen) >= 3
     now = net
     for _ in range(4):
@@ -144,7 +144,7 @@ def test_charges_add_up_after_sweeps_of_many_t1s_at_once(name):
     for _ in range(150):
         films = may_turn(net)
         sites = t1_sites(net, films)
-        chosen = films[independent(sites, rng.random(len(films)))]
+        chosen = films[independent(sites.bubbles, rng.random(len(films)))]
         before = net.sides
         one_by_one = net
         net = rewire(net, chosen)
@@ -178,7 +178,7 @@ def test_chosen_sites_share_no_bubble_and_one_is_always_chosen(name):
         films = rng.choice(net.n_films, count, replace=False)
         sites = t1_sites(net, films)
         for priority in (rng.random(count), np.zeros(count), rng.integers(0, 3, count) * 1.0):
-            chosen = independent(sites, priority)
+            chosen = independent(sites.bubbles, priority)
             assert chosen.shape == (count,)
             assert chosen.any()
             assert chosen[np.argmax(priority)] or (priority == priority.max()).sum() > 1
@@ -188,7 +188,7 @@ def test_chosen_sites_share_no_bubble_and_one_is_always_chosen(name):
 
 def test_nothing_to_choose_from():
     net = NETWORKS["torus of 60"]
-    assert independent(t1_sites(net, np.zeros(0, dtype=int)), np.zeros(0)).shape == (0,)
+    assert independent(t1_sites(net, np.zeros(0, dtype=int)).bubbles, np.zeros(0)).shape == (0,)
 
 
 def test_no_site_left_out_is_better_than_all_its_rivals():
@@ -196,7 +196,7 @@ def test_no_site_left_out_is_better_than_all_its_rivals():
     rng = np.random.default_rng(4)
     films = rng.choice(net.n_films, 100, replace=False)
     sites, priority = t1_sites(net, films), rng.random(100)
-    chosen = independent(sites, priority)
+    chosen = independent(sites.bubbles, priority)
     for i in np.flatnonzero(~chosen):
         rivals = np.isin(sites.bubbles, sites.bubbles[i]).any(axis=1)
         assert priority[rivals].max() > priority[i]

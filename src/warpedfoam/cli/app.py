@@ -125,8 +125,34 @@ def run(
     _run(options, as_json=as_json, quiet=quiet, debug=debug)
 
 
+potential_app = typer.Typer(
+    cls=SurfaceOrFile,
+    help="Map the energy of one bubble over its place on a surface, given as for foam.",
+    no_args_is_help=True,
+)
+app.add_typer(potential_app, name="potential")
+
+
 def _add_surface(kind: str, about: str, helps: Mapping[str, str]) -> None:
-    """Add ``foam KIND``: the surface's sizes, then the options that all surfaces share."""
+    """Add ``foam KIND`` and ``potential KIND``: the surface's sizes, then the options all surfaces share."""
+
+    def run_foam(surface: dict[str, Any], given: Mapping[str, Any]) -> None:
+        flags = {name: given[name] for name in ("as_json", "quiet", "debug")}
+        _run(lambda: _checked(_values(surface, given)), **flags)
+
+    _add_command(foam_app, kind, about, helps, SHARED, run_foam)
+    place = about.replace("A foam", "The potential of a bubble")
+    _add_command(potential_app, kind, place, helps, POTENTIAL, _potential_run)
+
+
+def _add_command(
+    group: typer.Typer,
+    kind: str,
+    about: str,
+    helps: Mapping[str, str],
+    shared: Mapping[str, tuple[Any, Any]],
+    do: Callable[[dict[str, Any], Mapping[str, Any]], None],
+) -> None:
     from warpedfoam.studies.sizes import SIZES
 
     sizes = SIZES[kind]
@@ -141,25 +167,33 @@ def _add_surface(kind: str, about: str, helps: Mapping[str, str]) -> None:
             parameters.append(inspect.Parameter(name, plain, default=default, annotation=option))
     parameters += [
         inspect.Parameter(name, plain, default=default, annotation=annotation)
-        for name, (annotation, default) in SHARED.items()
+        for name, (annotation, default) in shared.items()
+        if name != "along" or kind == "torus"
     ]
     if kind == "mesh":
         # who knows in which unit a file is
-        parameters = [p.replace(default=p.empty) if p.name == "gap" else p for p in parameters]
+        parameters = [p.replace(default=p.empty) if p.name in ("gap", "volume") else p for p in parameters]
 
     def command(**given: Any) -> None:
-        surface = {"kind": kind, **{name: given[name] for name in sizes}}
-        _run(
-            lambda: _checked(_values(surface, given)),
-            as_json=given["as_json"],
-            quiet=given["quiet"],
-            debug=given["debug"],
-        )
+        do({"kind": kind, **{name: given[name] for name in sizes}}, given)
 
     command.__doc__ = about
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {p.name: p.annotation for p in parameters}
-    foam_app.command(name=kind.replace("_", "-"))(command)
+    group.command(name=kind.replace("_", "-"))(command)
+
+
+def _potential_run(surface: dict[str, Any], given: Mapping[str, Any]) -> None:
+    with _ending_well(given["debug"]), _signals():
+        from warpedfoam.cli.potentials import all_at_rest, map_potential
+        from warpedfoam.cli.potentials import summary_text as told
+
+        facts = map_potential(surface, given)
+        if given["as_json"] or not given["quiet"]:
+            print(json.dumps(facts, allow_nan=False) if given["as_json"] else told(facts), flush=True)
+    if not all_at_rest(facts):
+        _say("some bubbles do not come to rest: they are blank in the table")
+        raise typer.Exit(NOT_CONVERGED)
 
 
 #: Options of every surface, with their defaults.
@@ -174,6 +208,26 @@ SHARED: Mapping[str, tuple[Any, Any]] = {
     "order": (Order, 4),
     "t1": (T1, True),
     "color_by": (Color, "charge"),
+    "out": (Folder, "out"),
+    "as_json": (Json, False),
+    "quiet": (Quiet, False),
+    "debug": (Debug, False),
+}
+#: The same of ``potential``.
+POTENTIAL: Mapping[str, tuple[Any, Any]] = {
+    "volume": (Annotated[float, typer.Option("--volume", help="Volume of the bubble.")], 0.5),
+    "gap": (Gap, 0.5),
+    "method": (
+        Annotated[str, typer.Option("--method", help="theory, ruled or free (3D films); several by commas.")],
+        "theory",
+    ),
+    "points": (Annotated[int, typer.Option("--points", help="About so many places all over it.")], 300),
+    "along": (
+        Annotated[int | None, typer.Option("--along", help="Instead, so many places from phi = 0 to 180.")],
+        None,
+    ),
+    "layers": (Annotated[int, typer.Option("--layers", help="Layers of free films, 2 to 12.")], 4),
+    "picture": (Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the potential.")], True),
     "out": (Folder, "out"),
     "as_json": (Json, False),
     "quiet": (Quiet, False),
@@ -220,6 +274,37 @@ _add_surface(
     "A foam between the smooth surface through a mesh, closed or with rims, and its parallel surface.",
     {"file": "Triangle mesh: PLY, OBJ, STL, OFF, GLB."},
 )
+
+
+@app.command()
+def figures(
+    which: Annotated[
+        str, typer.Argument(help="paper: the paper's figures and two new ones.", metavar="paper")
+    ],
+    out: Annotated[str, typer.Option("-o", "--out", help="Folder for the figures.")] = "figs",
+    only: Annotated[
+        list[str] | None, typer.Option("--only", help="One figure, such as torus; may be repeated.")
+    ] = None,
+    torus_table: Annotated[
+        str | None,
+        typer.Option("--torus-table", help="Take films on the torus from this CSV; computed if left out."),
+    ] = None,
+    layers: Annotated[int, typer.Option("--layers", help="Layers of the films, 2 to 12.")] = 4,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Draw the paper's figures with relaxed 3D films on the theory's lines; their tables as CSV."""
+    with _ending_well(debug), _signals():
+        from warpedfoam.cli.figures import draw_paper
+        from warpedfoam.cli.figures import summary_text as told
+
+        if which != "paper":
+            raise ValueError(f"there are no figures {which!r}; say: warpedfoam figures paper")
+        with progress_bars(quiet=quiet) as report:
+            facts = draw_paper(out, only=only, torus_table=torus_table, layers=layers, progress=report)
+        if as_json or not quiet:
+            print(json.dumps(facts, allow_nan=False) if as_json else told(facts), flush=True)
 
 
 @app.command()

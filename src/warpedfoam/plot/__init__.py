@@ -4,6 +4,7 @@ from warpedfoam.plot.charted import Charted
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
 from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
+from warpedfoam.plot.new_figures import figure_cylinder, figure_second_order
 from warpedfoam.plot.paper_figures import figure_curvature, figure_gap, figure_spheres, figure_torus_energy
 from warpedfoam.plot.potential_picture import plot_potential
 from warpedfoam.plot.surface_pictures import figure_circles, figure_surface
@@ -12,7 +13,9 @@ __all__ = [
     "Charted",
     "figure_circles",
     "figure_curvature",
+    "figure_cylinder",
     "figure_gap",
+    "figure_second_order",
     "figure_spheres",
     "figure_surface",
     "figure_torus_energy",

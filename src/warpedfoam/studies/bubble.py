@@ -12,6 +12,7 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.kernels.lateral_film import film_grid, region_moments, region_points, resampled, truncation
 from warpedfoam.studies.chart import Chart, OutOfChart, angle_coordinates, tangent_coordinates
 from warpedfoam.studies.held import HeldBubble, Solved, solve, stiffness
+from warpedfoam.studies.rims import OverRim, beyond, near_rim, require_on_surface
 
 #: Numbers of angles tried in turn, and the truncation that is good enough.
 ANGLES, RESOLVED = (17, 25, 37, 55), 1e-9
@@ -19,6 +20,8 @@ ANGLES, RESOLVED = (17, 25, 37, 55), 1e-9
 ROUGH = 1e-4
 #: Radial nodes: this many, and one more for so many angles more.
 RADIAL, ANGLES_A_RADIAL = 8, 6
+#: Least radius of a bubble in sizes of the surface: below, round-off hides its nodes.
+LEAST_RADIUS = 1e-8
 #: Ways to hold a bubble.
 HOLDS = ("centroid", "projection", "free")
 #: Gaps above this share of the critical one are named as the reason when no bubble is stable.
@@ -152,7 +155,8 @@ def bubble_between_plates(
     Raises
     ------
     TypeError, ValueError
-        For bad input; if ``position`` is not near the surface, or the bubble is too large for its surface.
+        For bad input; if ``position`` is not near the surface, or beyond its rim, or the bubble is too large
+        for its surface or reaches over its rim.
 
     Notes
     -----
@@ -173,6 +177,7 @@ def bubble_between_plates(
     task = _Task.checked(cell, volume, layers, hold, angles)
     start = as_floats(position, "position", (3,))
     point = cell.surface.project(start[None])[0]
+    require_on_surface(cell.surface, point, "position")
     if hold == "free":
         return _at_rest(task, point)
     return _held(task, point)
@@ -198,6 +203,12 @@ class _Task:
             raise ValueError(
                 f"volume must be less than the cell's, {between.volume:.6g}, got {amount:g}; "
                 "take a smaller bubble or a larger surface"
+            )
+        radius, least = float(np.sqrt(amount / (np.pi * between.gap))), LEAST_RADIUS * between.surface.size
+        if radius < least:
+            raise ValueError(
+                f"volume must be larger, got {amount:g}: on a surface of size {between.surface.size:.3g} the "
+                f"nodes of a bubble of radius {radius:.2g}, less than {least:.2g}, differ by round-off only"
             )
         tried: tuple[int, ...] = ANGLES
         if angles is not None:
@@ -245,7 +256,26 @@ def _held(task: _Task, point: Floats) -> BubbleBetweenPlates:
         if left <= RESOLVED or solved.worst > held.tolerance:
             break
     assert solved is not None
+    _require_inside_rim(task, held, solved)
     return _report(task, held, solved, left, force_turns=angular is None)
+
+
+def _require_inside_rim(task: _Task, held: HeldBubble, solved: Solved) -> None:
+    """Refuse a bubble that has the rim under it: films that end there are another problem."""
+    surface, origin, nodes = task.cell.surface, held.chart.origin, solved.state.nodes
+    reach = float(np.linalg.norm(nodes.points - origin, axis=-1).max())
+    if not near_rim(surface, origin, reach):
+        return
+    # where the region touches the inner plate, and the feet of the whole film
+    feet = nodes.points[-1] - held.grid.heights[:, None, None] * nodes.normals
+    under = np.concatenate([nodes.points[:, 0].reshape(-1, 3), feet.reshape(-1, 3)])
+    if beyond(surface, under).any():
+        away = float(np.linalg.norm(surface.rim.nearest(origin[None])[0] - origin)) if surface.rim else 0.0
+        raise OverRim(
+            f"volume {task.volume:g} is too large so close to the rim: the bubble at "
+            f"{origin.round(4).tolist()} has a radius of about {task.radius:.3g} and would reach over "
+            f"the rim, {away:.3g} away; hold it farther from the rim or take a smaller volume"
+        )
 
 
 def _report(
@@ -269,7 +299,7 @@ def _report(
         shape = task.cell.surface.shape_operators(chart.origin[None], project=False)[0]
         lever = float(away @ chart.frame[2]) * (chart.frame[:2] @ shape @ chart.frame[:2].T)
         slope = slope + lever @ slope
-    met = solved.worst <= held.tolerance
+    met = bool(solved.worst <= held.tolerance)
     softest = stiffness(held, solved)
     minimum = softest > 0.0
     return BubbleBetweenPlates(

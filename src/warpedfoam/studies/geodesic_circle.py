@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Floats, as_choice, as_floats, as_integer, as_number, frozen
 from warpedfoam.studies.measured_circle import exact_circle, heat_circle
-from warpedfoam.studies.traced_circle import MOST_DIRECTIONS, traced_circle
+from warpedfoam.studies.rims import require_on_surface
+from warpedfoam.studies.traced_circle import MOST_DIRECTIONS, require_off_rim, traced_circle
 from warpedfoam.surfaces.mesh_surface import MeshSurface
 from warpedfoam.surfaces.protocol import Surface
 from warpedfoam.theory import curvature_from_area, curvature_from_perimeter, validity_radius
@@ -121,7 +122,8 @@ def geodesic_circle(
         If ``surface`` is not a surface, or an argument has the wrong type.
     ValueError
         If an argument is out of range; if "jacobi" meets a conjugate point before ρ or its circle crosses
-        itself; if the points at distance ρ on the mesh do not make one closed curve.
+        itself; if the points at distance ρ on the mesh do not make one closed curve; if a geodesic of
+        length ρ leaves the surface over its rim.
     ResolutionError
         If the mesh is too coarse for the radius, or the spacing too fine for memory.
     ConvergenceError
@@ -167,6 +169,7 @@ def geodesic_circle(
     if rho > 10.0 * surface.size:
         raise ValueError(f"radius must be at most ten times the surface's size {surface.size:g}, got {rho:g}")
     q = surface.project(place[None])[0]
+    require_on_surface(surface, q, "centre")
     gauss = float(surface.gaussian_curvature(q[None])[0])
     if method == "jacobi":
         if spacing is not None:
@@ -183,6 +186,7 @@ def geodesic_circle(
             gauss,
             method,
         )
+    require_off_rim(surface, q, rho)
     edge = SPACING * rho if spacing is None else as_number(spacing, "spacing", positive=True)
     measure = exact_circle if method == "exact" else heat_circle
     line, error, area_error, found = measure(surface, q, rho, edge)

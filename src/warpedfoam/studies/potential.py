@@ -26,6 +26,7 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ConvergenceError
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 from warpedfoam.studies.bubble import BubbleBetweenPlates, bubble_between_plates
+from warpedfoam.studies.rims import OverRim, disks_over_rim, require_on_surface
 from warpedfoam.theory import second_order_energy
 
 #: E of (volume, gap, k1, k2), the last two arrays of principal curvatures of the inner plate.
@@ -56,7 +57,8 @@ class GeometricPotential:
     pressures : (n,) array
         ∂E/∂V; NaN for models.
     converged : (n,) bool array
-        Whether the bubble there came to rest; True for models.
+        Whether the bubble there came to rest; for models, whether a disk of its flat radius stays on the
+        surface.
     triangles : (k, 3) int array or None
         Of the triangulation whose nodes the points are, if they cover the surface.
     lengths : (n,) array or None
@@ -127,11 +129,13 @@ def geometric_potential(
     Raises
     ------
     TypeError, ValueError
-        For bad input; if the bubble is too large for its surface somewhere.
+        For bad input; if the bubble is too large for its surface somewhere, or reaches over the rim
+        everywhere.
 
     Notes
     -----
-    Bubbles that did not come to rest have NaN for energy, force and pressure and False in ``converged``.
+    Bubbles that did not come to rest, or would reach over the rim of a surface that has one, have NaN for
+    energy, force and pressure and False in ``converged``.
     Forces of models are differences of order four along the surface.
 
     Examples
@@ -170,30 +174,59 @@ def _evaluate(
 ) -> GeometricPotential:
     if method == THEORY or callable(method):
         model: Model = method if callable(method) else second_order_energy
-        energies, forces = _of_model(cell, volume, places, model)
         name = getattr(method, "__name__", type(method).__name__) if callable(method) else THEORY
-        ones, nan = np.ones(len(places), dtype=bool), np.full(len(places), np.nan)
-        shared = (frozen(places), frozen(energies), frozen(forces), frozen(nan), frozen(ones))
+        kept = ~disks_over_rim(cell.surface, places, _flat_radius(cell, volume))
+        _require_some(kept, volume)
+        rows = np.full((len(places), 5), np.nan)
+        rows[kept, 0], rows[kept, 2:] = _of_model(cell, volume, places[kept], model)
+        shared = (frozen(places), frozen(rows[:, 0]), frozen(rows[:, 2:]), frozen(rows[:, 1]), frozen(kept))
         return GeometricPotential(cell, volume, name, 0, *shared, triangles=None, lengths=None)
     kind = as_choice(method, "method", (*FILMS, THEORY))
     count = 1 if kind == "ruled" else as_integer(layers, "layers", minimum=2, maximum=12)
     how = as_choice(hold, "hold", ("centroid", "projection"))
-    bubbles = [bubble_between_plates(cell, volume, q, layers=count, hold=how) for q in places]
-    return _collected(cell, volume, kind, count, bubbles)
+
+    def bubble(q: Floats) -> BubbleBetweenPlates | None:
+        try:
+            return bubble_between_plates(cell, volume, q, layers=count, hold=how)
+        except OverRim:
+            return None
+
+    return _collected(cell, volume, kind, count, places, [bubble(q) for q in places])
+
+
+def _flat_radius(cell: HeleShawCell, volume: float) -> float:
+    return float(np.sqrt(volume / (np.pi * cell.gap)))
+
+
+def _require_some(kept: Bools, volume: float) -> None:
+    if not kept.any():
+        raise OverRim(
+            f"volume {volume:g} is too large so close to the rim: the bubble would reach over it at "
+            + ("the place given" if len(kept) == 1 else f"all {len(kept)} places")
+            + "; take places farther from the rim or a smaller volume"
+        )
 
 
 def _collected(
-    cell: HeleShawCell, volume: float, kind: str, layers: int, bubbles: list[BubbleBetweenPlates]
+    cell: HeleShawCell,
+    volume: float,
+    kind: str,
+    layers: int,
+    places: Floats,
+    bubbles: list[BubbleBetweenPlates | None],
 ) -> GeometricPotential:
-    rests = np.array([b.converged for b in bubbles])
-    rows = np.array([[b.energy, b.pressure, *b.force] for b in bubbles])
-    rows[~rests] = np.nan
+    _require_some(np.array([b is not None for b in bubbles]), volume)
+    rests = np.array([b is not None and b.converged for b in bubbles])
+    rows = np.full((len(places), 5), np.nan)
+    for row, b in zip(rows, bubbles, strict=True):
+        if b is not None and b.converged:
+            row[:] = [b.energy, b.pressure, *b.force]
     return GeometricPotential(
         cell,
         volume,
         kind,
         layers,
-        frozen(np.array([b.position for b in bubbles])),
+        frozen(places),
         frozen(rows[:, 0]),
         frozen(rows[:, 2:]),
         frozen(rows[:, 1]),
@@ -212,7 +245,7 @@ def _of_model(cell: HeleShawCell, volume: float, places: Floats, model: Model) -
         values = np.asarray(model(volume, cell.gap, k1, k2))
         return as_floats(values, "the values of method", (len(points),))
 
-    h = DIFFERENCE * float(np.sqrt(volume / (np.pi * cell.gap)))
+    h = DIFFERENCE * _flat_radius(cell, volume)
     slopes = []
     for axis in np.eye(2):
         steps = np.repeat(h * np.array([-2.0, -1.0, 1.0, 2.0]), n)[:, None] * axis
@@ -235,7 +268,7 @@ def drift_path(
     """Path of steepest descent of the potential, along which a bubble with friction drifts.
 
     Midpoint steps along F/|F|, halved where the energy would rise or the force turn back, until they are 2⁻¹⁰
-    of the first.
+    of the first. On a surface with a rim the path ends where the bubble touches it.
 
     Parameters
     ----------
@@ -273,10 +306,10 @@ def drift_path(
     between = as_instance(cell, "cell", HeleShawCell)
     amount = as_number(volume, "volume", positive=True)
     surface = between.surface
-    flat = float(np.sqrt(amount / (np.pi * between.gap)))
-    first = flat if step is None else as_number(step, "step", positive=True)
+    first = _flat_radius(between, amount) if step is None else as_number(step, "step", positive=True)
     count = as_integer(most, "most", minimum=1)
     place = surface.project(as_floats(start, "start", (3,))[None])
+    require_on_surface(surface, place[0], "start")
 
     def at(point: Floats) -> GeometricPotential:
         out = _evaluate(between, amount, point, method, layers, "centroid")
@@ -293,9 +326,13 @@ def drift_path(
     while len(trail) <= count and size > first / 1024.0:
         if np.linalg.norm(here.forces) <= 1e-12 * between.gap:
             break
-        middle = at(moved(here.points, here.forces, 0.5 * size))
-        pull = middle.forces if np.linalg.norm(middle.forces) > 0.0 else here.forces
-        there = at(moved(here.points, pull, size))
+        try:
+            middle = at(moved(here.points, here.forces, 0.5 * size))
+            pull = middle.forces if np.linalg.norm(middle.forces) > 0.0 else here.forces
+            there = at(moved(here.points, pull, size))
+        except OverRim:
+            size *= 0.5
+            continue
         # neither uphill nor past the bottom
         ahead = float((there.forces * (there.points - here.points)).sum())
         if there.energies[0] < here.energies[0] and ahead >= 0.0:

@@ -11,19 +11,27 @@ trapezoid rule in θ converges faster than any power, because m is smooth and pe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpedfoam.arrays import Bools, Floats
 from warpedfoam.errors import ConvergenceError
 from warpedfoam.kernels.periodic import nearest_image
+from warpedfoam.studies.rims import OverRim, beyond, near_rim
 from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import Surface
+
+if TYPE_CHECKING:
+    from scipy.integrate import DOP853
 
 #: A run at so many times the tolerance tells how far off the finer one is at most.
 COARSER = 100.0
 #: Directions at most, and change of C and A, in tolerances, at which no more are added.
 MOST_DIRECTIONS, ENOUGH = 1024, 0.1
+#: Places on each step of the integration at which a geodesic may be found beyond the rim; directions and
+#: tolerance when nothing else is asked.
+RIM_PLACES, RIM_DIRECTIONS, RIM_TOLERANCE = 6, 64, 1e-6
 #: Points of the circle in which crossings with itself are looked for.
 CROSSING_POINTS = 1024
 
@@ -47,7 +55,7 @@ def traced_circle(
     Raises
     ------
     ValueError
-        If a geodesic meets a conjugate point before ``radius``, or the circle crosses itself.
+        If a geodesic meets a conjugate point or the rim before ``radius``, or the circle crosses itself.
     ConvergenceError
         If the integration fails.
     """
@@ -107,6 +115,7 @@ def _trace(
         out[:, 11] = state[:, 9]
         return out.ravel()
 
+    rim_near = near_rim(surface, centre, radius)
     solver = DOP853(rate, 0.0, start.ravel(), 1.0, rtol=tolerance, atol=0.1 * tolerance)
     while solver.status == "running":
         message = solver.step()
@@ -114,6 +123,8 @@ def _trace(
             raise ConvergenceError(
                 f"tracing geodesics failed at {solver.t * radius:g} of {radius:g}: {message}"
             )
+        if rim_near:
+            _require_inside_rim(surface, centre, radius, solver)
         spread = solver.y.reshape(n, 12)[:, 9]
         if (spread <= 0.0).any():
             worst = np.degrees(angles[int(spread.argmin())])
@@ -123,6 +134,34 @@ def _trace(
             )
     out: Floats = solver.y.reshape(n, 12)
     return out
+
+
+def require_off_rim(surface: Surface, centre: Floats, radius: float) -> None:
+    """Refuse a disk whose radii cross the rim.
+
+    Raises
+    ------
+    ValueError
+        If one does, or the tracing comes to an end for another reason.
+    """
+    if near_rim(surface, centre, radius):
+        angles = 2.0 * np.pi * np.arange(RIM_DIRECTIONS) / RIM_DIRECTIONS
+        _trace(surface, centre, surface.vertex_frames(centre[None])[0], angles, radius, RIM_TOLERANCE)
+
+
+def _require_inside_rim(surface: Surface, centre: Floats, radius: float, solver: DOP853[Any]) -> None:
+    """Look at the last step of every geodesic."""
+    way = solver.dense_output()
+    for place in np.linspace(solver.t_old, solver.t, RIM_PLACES + 1)[1:]:
+        at = centre + radius * way(place).reshape(-1, 12)[:, :3]
+        if beyond(surface, at).any():
+            x, y, z = at[int(beyond(surface, at).argmax())]
+            # no geodesic is shorter than the straight way
+            away = np.linalg.norm(surface.rim.nearest(centre[None])[0] - centre) if surface.rim else 0.0
+            raise OverRim(
+                f"radius must be at most about {away:.4g}, got {radius:g}: a geodesic from the centre leaves "
+                f"the surface over its rim near ({x:.4g}, {y:.4g}, {z:.4g})"
+            )
 
 
 def _require_simple(surface: Surface, points: Floats, radius: float) -> None:
