@@ -141,7 +141,7 @@ ROWS: list[Row] = [
         "folds the outer plate: it must be less",
     ),
     ("poles swapped", lambda: revolution(bottom=3.0, top=-3.0), V, "top must lie above bottom"),
-    ("profile below 0", lambda: revolution(lambda z: -egg(z)), V, "square must be 0 at bottom and top"),
+    ("profile below 0", lambda: revolution(lambda z: -egg(z)), V, "square must be above 0 between"),
     (
         "pointed poles",
         lambda: revolution(lambda z: egg(z) ** 2, lambda z: 2 * egg(z) * egg_slope(z)),

@@ -403,5 +403,19 @@ def test_the_interpreter_survives():
 
 
 def test_exact_distances_check_the_mesh_themselves():
-    with pytest.raises(MeshError, match="open"):
-        exact_distances(TriangleMesh(MESH.nodes, MESH.triangles[1:]), np.array([0]))
+    turned = np.vstack([MESH.triangles[:1, ::-1], MESH.triangles[1:]])
+    with pytest.raises(MeshError, match="oriented against each other"):
+        exact_distances(TriangleMesh(MESH.nodes, turned), np.array([0]))
+
+
+def test_distances_on_a_mesh_with_a_rim():
+    """A hemisphere's distances from its pole are the sphere's, by both methods."""
+    ball = Sphere(1.0).triangulate(3000)
+    kept = ball.triangles[(ball.nodes[ball.triangles][:, :, 2] > -0.05).all(axis=1)]
+    used, triangles = np.unique(kept, return_inverse=True)
+    dome = TriangleMesh(ball.nodes[used], triangles.reshape(-1, 3))
+    assert len(dome.rim_loops) == 1
+    pole = int(dome.nodes[:, 2].argmax())
+    true = np.arccos(np.clip(dome.nodes @ dome.nodes[pole], -1.0, 1.0))
+    exact = exact_distances(dome, np.array([pole]))
+    np.testing.assert_allclose(np.asarray(exact).ravel(), true, atol=3e-3)

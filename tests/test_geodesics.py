@@ -301,7 +301,6 @@ BAD_MESHES = {
         "twice",
     ),
     "coinciding nodes": (collapsed, MeshError, "no area"),
-    "open": (lambda: sphere_with(triangles=SMALL.triangles[1:]), MeshError, "open"),
     "two components": (two_spheres, MeshError, "2 separate"),
     "three triangles on an edge": (doubled_edge, MeshError, "more than two"),
     "flipped": (

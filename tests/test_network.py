@@ -212,12 +212,12 @@ def test_next_starts_where_its_half_film_ends():
 def test_two_or_three_films_meet():
     # four lunes: two vertices where four films meet
     lunes = [(0, 2, 1, 3), (0, 3, 1, 4), (0, 4, 1, 5), (0, 5, 1, 2)]
-    with pytest.raises(TopologyError, match=r"vertex 0 has 4 films; two \(a marker\) or three"):
+    with pytest.raises(TopologyError, match="vertex 0 has 4 films; three must meet, two at a marker"):
         network_from_loops(lunes)
     net = network_from_loops(TETRAHEDRON)
     with pytest.raises(TopologyError, match="vertex 3 has 0 films"):  # a number that is left out
         CellNetwork(net.next, np.where(net.origin == 3, 4, net.origin), net.bubble)
-    with pytest.raises(TopologyError, match="vertex 0 has 1 films"):  # both its ends loose
+    with pytest.raises(TopologyError, match="comes back to vertex"):  # both its ends loose
         CellNetwork([1, 0], [0, 1], [0, 0])
 
 

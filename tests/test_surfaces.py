@@ -26,7 +26,8 @@ def surface_classes():
         for _, kind in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
             if kind.__module__.startswith("warpedfoam.surfaces") and hasattr(kind, "arc_terms"):
                 found.add(kind)
-    return found - {Surface, LevelSurface, NettedSurface}
+    public = {kind for kind in found if not kind.__name__.startswith("_")}
+    return public - {Surface, LevelSurface, NettedSurface}
 
 
 def test_every_surface_class_is_tested_and_is_a_surface():

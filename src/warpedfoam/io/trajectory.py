@@ -6,6 +6,7 @@ import io
 import json
 import os
 import secrets
+import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -39,6 +40,8 @@ SUFFIXES = (".h5", ".hdf5")
 _INTS = ("next", "origin", "bubble", "bubble_euler", "bubble_ids")
 _FLOATS = ("vertex_points", "film_offsets", "target_volumes", "pressures")
 _DATA = (*_INTS, *_FLOATS, "header")
+#: Looks at a file that is being written, and seconds between them.
+LOOKS, PAUSE = 5, 0.05
 _PURPOSE = "HDF5"
 _CHUNK = 4096
 
@@ -210,27 +213,35 @@ class Trajectory:
         self.path = existing(as_path(path))
         self._known = known_surfaces(surfaces)
         self._file: Any = None
-        try:
-            self._file = _opened(h5py, self.path)
-            self._header, self._surface = _checked(h5py, self._file)
-            index = self._file["index"][()]
-            if index.ndim != 2 or index.shape[1] != len(_DATA) + 1 or index.dtype != np.int64:
-                raise FileFormatError("its index has the wrong shape or type")
-            self._ends = np.vstack([np.zeros((1, len(_DATA)), dtype=np.int64), index[:, :-1]])
-            if (np.diff(self._ends, axis=0) < 0).any():
-                raise FileFormatError("its index does not rise")
-            self._sums = index[:, -1]
-            self.times: Floats = frozen(np.asarray(self._file["time"][: len(index)], dtype=np.float64))
-            if len(self.times) != len(index) or not np.isfinite(self.times).all():
-                raise FileFormatError("its times are missing or not finite")
-        except FileFormatError as fault:
-            self.close()
-            raise FileFormatError(f"cannot read {self.path}: {fault}") from None
-        except Exception as fault:  # whatever a damaged file makes the library raise
-            self.close()
-            raise FileFormatError(
-                f"cannot read {self.path}: it is no trajectory or it is damaged ({fault})"
-            ) from fault
+        for look in range(LOOKS):
+            try:
+                self._read(h5py)
+                return
+            except Exception as fault:  # whatever a damaged file makes the library raise
+                self.close()
+                if look + 1 < LOOKS and is_open(self.path):
+                    # a copy taken while the writer was at it may be torn: the next is not
+                    time.sleep(PAUSE)
+                    continue
+                if isinstance(fault, FileFormatError):
+                    raise FileFormatError(f"cannot read {self.path}: {fault}") from None
+                raise FileFormatError(
+                    f"cannot read {self.path}: it is no trajectory or it is damaged ({fault})"
+                ) from fault
+
+    def _read(self, h5py: Any) -> None:
+        self._file = _opened(h5py, self.path)
+        self._header, self._surface = _checked(h5py, self._file)
+        index = self._file["index"][()]
+        if index.ndim != 2 or index.shape[1] != len(_DATA) + 1 or index.dtype != np.int64:
+            raise FileFormatError("its index has the wrong shape or type")
+        self._ends = np.vstack([np.zeros((1, len(_DATA)), dtype=np.int64), index[:, :-1]])
+        if (np.diff(self._ends, axis=0) < 0).any():
+            raise FileFormatError("its index does not rise")
+        self._sums = index[:, -1]
+        self.times: Floats = frozen(np.asarray(self._file["time"][: len(index)], dtype=np.float64))
+        if len(self.times) != len(index) or not np.isfinite(self.times).all():
+            raise FileFormatError("its times are missing or not finite")
 
     def __len__(self) -> int:
         return len(self._sums)
