@@ -1,0 +1,246 @@
+"""Commands that study, show and convert foams; each hands its arguments to a file of its own."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
+from warpedfoam.cli.flags import Debug, Folder, Json, Quiet, Seed
+from warpedfoam.cli.progress import progress_bars
+
+verbs = typer.Typer()
+
+
+@verbs.command()
+def figures(
+    which: Annotated[
+        str, typer.Argument(help="paper: the paper's figures and two new ones.", metavar="paper")
+    ],
+    out: Annotated[str, typer.Option("-o", "--out", help="Folder for the figures.")] = "figs",
+    only: Annotated[
+        list[str] | None, typer.Option("--only", help="One figure, such as torus; may be repeated.")
+    ] = None,
+    torus_table: Annotated[
+        str | None,
+        typer.Option("--torus-table", help="Take films on the torus from this CSV; computed if left out."),
+    ] = None,
+    layers: Annotated[int, typer.Option("--layers", help="Layers of the films, 2 to 12.")] = 4,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Draw the paper's figures with relaxed 3D films on the theory's lines; their tables as CSV."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.figures import draw_paper
+        from warpedfoam.cli.figures import summary_text as told
+
+        if which != "paper":
+            raise ValueError(f"there are no figures {which!r}; say: warpedfoam figures paper")
+        with progress_bars(quiet=quiet) as report:
+            facts = draw_paper(out, only=only, torus_table=torus_table, layers=layers, progress=report)
+        if as_json or not quiet:
+            print(json.dumps(facts, allow_nan=False) if as_json else told(facts), flush=True)
+
+
+@verbs.command()
+def check(
+    file: Annotated[str, typer.Argument(help="Triangle mesh: PLY, OBJ, STL, OFF, GLB.", metavar="MESH")],
+    gap: Annotated[
+        float | None, typer.Option("--gap", help="Also: would plates this far apart fold?")
+    ] = None,
+    n_bubbles: Annotated[
+        int | None, typer.Option("-n", "--n-bubbles", help="Also: fine enough for so many bubbles?")
+    ] = None,
+    repair: Annotated[
+        str | None, typer.Option("--repair", metavar="FILE", help="Write a safely repaired mesh (PLY).")
+    ] = None,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Tell what is wrong with a mesh and what to do; exit code 1 if it cannot carry a foam."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.checking import check_file
+
+        sound, text, facts = check_file(file, gap=gap, n_bubbles=n_bubbles, repair=repair)
+        print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+    if not sound:
+        raise typer.Exit(NOT_CONVERGED)
+
+
+@verbs.command()
+def defects(
+    file: Annotated[str, typer.Argument(help="A saved foam: foam.npz.", metavar="FOAM.NPZ")],
+    out: Annotated[
+        str | None, typer.Option("-o", "--out", help="Folder for the results; the foam's own if left out.")
+    ] = None,
+    tiny: Annotated[
+        float, typer.Option("--tiny", help="Flag films shorter than this many bubble sizes.")
+    ] = 0.1,
+    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the defects.")] = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Find the defects of a foam: charges, dislocations, scars, pleats; tables and a picture."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.defects import inspect_file, summary_tables, summary_text
+
+        found, facts = inspect_file(file, out=out, tiny=tiny, picture=picture)
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            from rich.console import Console
+
+            Console(highlight=False).print(summary_tables(found, facts))
+            print(summary_text(facts), flush=True)
+
+
+FoamFile = Annotated[str, typer.Argument(help="A foam: NPZ, VTP or HDF5 of warpedfoam.", metavar="FOAM")]
+Frame = Annotated[int, typer.Option("--frame", help="Frame of a trajectory, from 0; -1 is the last.")]
+
+
+@verbs.command()
+def convert(
+    file: FoamFile,
+    targets: Annotated[
+        list[str],
+        typer.Argument(
+            help="Files to write; their endings tell the format: npz, h5, vtp, vtm, ply, glb, obj, "
+            "graphml, json, csv, parquet, fe.",
+            metavar="OUT...",
+        ),
+    ],
+    color_by: Annotated[
+        str | None, typer.Option("--color-by", help="Colour PLY and GLB by charge, pressure, sides or area.")
+    ] = None,
+    frame: Frame = -1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write a foam in other formats, such as foam.npz to out.vtp for ParaView or out.glb for browsers."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.converting import convert as converted
+
+        text, facts = converted(file, targets, color_by=color_by, frame=frame)
+        if as_json or not quiet:
+            print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+
+
+@verbs.command()
+def info(file: FoamFile, frame: Frame = -1, as_json: Json = False, debug: Debug = False) -> None:
+    """Tell what foam is in a file: surface, bubbles, sides, energy."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.converting import info as told
+
+        text, facts = told(file, frame=frame)
+        print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+
+
+@verbs.command()
+def view(
+    files: Annotated[
+        list[str],
+        typer.Argument(help="Saved foams (foam.npz); several make a trajectory.", metavar="FOAM.NPZ..."),
+    ],
+    out: Annotated[
+        str | None, typer.Option("-o", "--out", help="HTML file; beside the first foam if left out.")
+    ] = None,
+    color_by: Annotated[
+        str,
+        typer.Option(
+            help="Show first: charge, sides, area, volume, pressure, curvature (of bubbles), surface "
+            "(curvature, point by point) or id."
+        ),
+    ] = "charge",
+    title: Annotated[str | None, typer.Option("--title", help="Heading of the page.")] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write one HTML file that shows a foam in 3D in any browser, without a network."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.viewing import view_files
+
+        path, facts = view_files(files, out=out, color_by=color_by, title=title)
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser", flush=True)
+
+
+@verbs.command()
+def ensemble(
+    file: Annotated[str, typer.Argument(help="TOML file of a study.", metavar="STUDY.TOML")],
+    out: Annotated[str, typer.Option("-o", "--out", help="Folder for the results; goes on there.")] = "out",
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Processes on this machine; 0: none but this one.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Use this dask scheduler.")
+    ] = None,
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replace an option, such as repeats=10."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Compute every run of a study into one table; go on where an earlier call ended."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli.ensembles import ensemble_text, run_file
+
+        with progress_bars(quiet=quiet) as report:
+            facts = run_file(file, out, sets or [], workers=workers, scheduler=scheduler, progress=report)
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(ensemble_text(facts), flush=True)
+    bad = {state: n for state, n in facts["counts"].items() if n and state != "converged"}
+    if bad:
+        say(", ".join(f"{n} of {facts['runs']} runs {state}" for state, n in bad.items()) + "; see the table")
+        raise typer.Exit(NOT_CONVERGED)
+
+
+@verbs.command()
+def partition(
+    surface: Annotated[
+        str, typer.Argument(help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE")
+    ],
+    n_bubbles: Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of equal areas.")],
+    size: Annotated[
+        list[str] | None, typer.Option("--size", metavar="NAME=VALUE", help="A size, such as radius=1.")
+    ] = None,
+    starts: Annotated[int, typer.Option("--starts", help="Starts of the search.")] = 30,
+    hops: Annotated[int, typer.Option("--hops", help="Moves tried from each start.")] = 20,
+    seed: Seed = 0,
+    out: Folder = "out",
+    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the partition.")] = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Search for the shortest films that divide a surface into equal areas; goes on where it was stopped."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli import partition as job
+
+        with progress_bars(quiet=quiet) as report:
+            facts = job.search(
+                surface,
+                size or [],
+                n_bubbles,
+                seed=seed,
+                starts=starts,
+                hops=hops,
+                out=out,
+                picture=picture,
+                progress=report,
+            )
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(job.summary_text(facts), flush=True)
