@@ -133,8 +133,11 @@ COUNTS = {
     "crystal": 200,
     "tube": 240,
     "hills": 240,
-    "patch": 60,
+    "patch": 140,
     "plate": 60,
+    "waist": 240,
+    "bowl": 240,
+    "funnel": 240,
 }
 
 each_member = pytest.mark.parametrize("member", FAMILY.values(), ids=FAMILY)

@@ -34,18 +34,25 @@ class Held:
     links: Floats
 
 
-def held_vertices(surface: Surface, network: CellNetwork, points: Floats, offsets: Floats) -> Held | None:
+def held_vertices(
+    surface: Surface, network: CellNetwork, points: Floats, offsets: Floats, *, loose: bool = True
+) -> Held | None:
     """What is held at a state, or None.
 
-    A marker that slid along its film would exploit the quadrature; a rim vertex leaves the surface.
+    A marker that slid along its film would exploit the quadrature; a rim vertex leaves the surface. In an
+    open cluster, which may travel far, markers are ``loose``: links make them follow their neighbours.
+    Where bubbles fill the surface they stay where they are along their film, which keeps Newton exact.
     """
     parts = []
     linked, links = np.zeros(0, dtype=np.int64), np.zeros((4, 0))
     if len(network.markers):
         along = marker_tangents(surface, network, points, offsets)
         count = len(along)
-        parts.append((network.markers, along, np.full(count, 0.5 * GRIP), np.zeros(count)))
-        linked, links = _links(surface, network, points)
+        parts.append(
+            (network.markers, along, np.full(count, 0.5 * (GRIP if loose else 1.0)), np.zeros(count))
+        )
+        if loose:
+            linked, links = _links(surface, network, points)
     if surface.rim is not None and len(network.rim_vertices):
         at = points[network.rim_vertices]
         places = surface.rim.locate(at)

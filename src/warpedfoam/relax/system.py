@@ -155,7 +155,8 @@ class Linearised:
         self.hessian[:, :4] *= system.length
         self.volume[:4] *= system.length
         self.force[:4] *= system.length
-        held = held_vertices(system.cell.surface, network, state.points, state.offsets)
+        loose = system.exterior is not None
+        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=loose)
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
         if held is not None or not system.invariant:
