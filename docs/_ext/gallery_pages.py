@@ -40,7 +40,8 @@ def title_and_text(path: Path) -> tuple[str, str]:
             break
         head.append(line.lstrip("# "))
     command, text = head[0], " ".join(head[1:])
-    title = "Every option of the main job" if path.stem == "foam" else f"Study: {path.stem.replace('_', ' ')}"
+    study = path.stem.replace("schwarz_p", "Schwarz's P").replace("_", " ")
+    title = "Every option of the main job" if path.stem == "foam" else f"Study: {study}"
     return title, f"{text}\n\n    {command}\n"
 
 
