@@ -3,6 +3,8 @@
 
     python3 run.py foam [torus|sphere] [options]   the main job; writes to out/
     python3 run.py test [pytest options]           ruff, mypy, layers, tests, doctests, examples
+    python3 run.py docs [sphinx options]           the documentation as a site: site/index.html
+    python3 run.py gallery [names or groups]       draws the documentation's pictures anew (minutes)
 
 Needs nothing but Python 3.11 or newer. Run it as often as you like: it installs again only when
 pyproject.toml has changed. The environment is the folder .venv beside this file.
@@ -103,8 +105,8 @@ def installed_for(extra):
 def install(extra=""):
     """Install the package in place with an extra, unless that has been done for this pyproject.toml."""
     make_environment()
-    want = installed_for(extra)
-    if want in stamp_lines():
+    want, done = installed_for(extra), stamp_lines()
+    if want in done or installed_for("[dev]") in done:  # which has all the others
         return
     say("installing warpedfoam%s and what it needs (once; takes a minute or two)" % extra)
     done = subprocess.call(
@@ -150,9 +152,25 @@ def test(arguments):
     return 1 if failed else 0
 
 
+def docs(arguments):
+    """Warnings are errors. Pictures are those in docs/: "run.py gallery" draws them."""
+    install("[docs]")
+    pages, site = os.path.join(HERE, "docs"), os.path.join(HERE, "site")
+    command = [PYTHON, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto", *arguments, pages, site]
+    status = subprocess.call(command, cwd=HERE)
+    if status == 0:
+        say("the site is " + os.path.join(site, "index.html"))
+    return status
+
+
+def gallery(arguments):
+    install("[docs,ensemble]")
+    return subprocess.call([PYTHON, os.path.join(HERE, "docs", "drawing"), *arguments], cwd=HERE)
+
+
 def main():
     use_new_enough_python()
-    verbs = {"foam": foam, "test": test}
+    verbs = {"foam": foam, "test": test, "docs": docs, "gallery": gallery}
     if len(sys.argv) < 2 or sys.argv[1] not in verbs:
         sys.stderr.write(__doc__)
         return 0 if sys.argv[1:] in (["-h"], ["--help"]) else 2

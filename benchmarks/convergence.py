@@ -1,6 +1,7 @@
 """Spectral convergence in film order: energies and pressures of the same foams at p = 2 … 10, against p = 12.
 
-    python benchmarks/convergence.py --plot convergence.png
+    python benchmarks/convergence.py --csv benchmarks/data/film_order.csv --plot docs/film_order.png
+    python benchmarks/convergence.py --redraw benchmarks/data/film_order.csv --plot again.png
 
 Three foams: 32 and 200 bubbles on the unit sphere (gap 0.01), 200 on Torus(20, 4) (gap 0.5), relaxed at
 p = 4 with T1s, then at every other order from there without. The error of the energy is relative; that of the
@@ -15,6 +16,7 @@ import os
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
 
 import argparse
+import csv
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,8 +36,8 @@ class Curve:
     orders: list[int]
     energy: list[float]
     pressure: list[float]
-    four_to_eight: float
-    converged: bool
+    four_to_eight: float = float("nan")
+    converged: bool = True
 
 
 def converge(
@@ -67,6 +69,28 @@ def converge(
     )
 
 
+def write_csv(curves: list[Curve], path: Path) -> None:
+    """A row per foam and order: all that `draw` needs."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["foam", "bubbles", "order", "energy", "pressures"])
+        for curve in curves:
+            for p, energy, pressure in zip(curve.orders, curve.energy, curve.pressure, strict=True):
+                writer.writerow([curve.name, curve.bubbles, p, f"{energy:.3g}", f"{pressure:.3g}"])
+
+
+def read_csv(path: Path) -> list[Curve]:
+    """The curves that `write_csv` wrote."""
+    curves: dict[str, Curve] = {}
+    with path.open(newline="", encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            curve = curves.setdefault(row["foam"], Curve(row["foam"], int(row["bubbles"]), [], [], []))
+            curve.orders.append(int(row["order"]))
+            curve.energy.append(float(row["energy"]))
+            curve.pressure.append(float(row["pressures"]))
+    return list(curves.values())
+
+
 def draw(curves: list[Curve], reference: int, path: Path) -> None:
     """Errors over order, logarithmic; energies full, pressures dashed."""
     import matplotlib
@@ -95,8 +119,13 @@ def main() -> int:
     parser.add_argument("--orders", type=int, nargs="+", default=[2, 3, 4, 5, 6, 8, 10])
     parser.add_argument("--reference", type=int, default=12)
     parser.add_argument("--tolerance", type=float, default=1e-12, help="of the residuals")
+    parser.add_argument("--csv", type=Path, help="write the errors there")
+    parser.add_argument("--redraw", type=Path, help="measure nothing: take the errors from this file")
     parser.add_argument("--plot", type=Path, help="write a PNG of the errors")
     args = parser.parse_args()
+    if args.redraw:
+        draw(read_csv(args.redraw), args.reference, args.plot or args.redraw.with_suffix(".png"))
+        return 0
     foams = (("sphere", 32), ("sphere", 200), ("torus", 200))
     curves = [
         converge(surface, bubbles, args.seeds, args.seed, args.orders, args.reference, args.tolerance)
@@ -112,6 +141,8 @@ def main() -> int:
         fine = curve.bubbles < 200 or curve.four_to_eight <= 1e-7
         good = good and fine and curve.converged
         print(f"{curve.name}: energies at p = 4 and p = 8 differ by {curve.four_to_eight:.1e}")
+    if args.csv:
+        write_csv(curves, args.csv)
     if args.plot:
         draw(curves, args.reference, args.plot)
         print(f"wrote {args.plot}")

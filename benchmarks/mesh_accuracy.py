@@ -1,6 +1,7 @@
 """Foams on meshes against the same foams on formulas: errors and their orders in the mesh size h.
 
-    python benchmarks/mesh_accuracy.py --plot docs/mesh_accuracy.png
+    python benchmarks/mesh_accuracy.py --csv benchmarks/data/mesh_accuracy.csv --plot docs/mesh_accuracy.png
+    python benchmarks/mesh_accuracy.py --redraw benchmarks/data/mesh_accuracy.csv --plot again.png
 
 Two surfaces: Torus(20, 4) with gap 0.5 and Sphere(10) with gap 0.1, each as meshes whose nodes are pushed
 about by 0.2 mean edges and put back on the surface, several times with other random numbers. A foam of 200
@@ -27,6 +28,7 @@ import os
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
 
 import argparse
+import csv
 import sys
 import time
 from dataclasses import dataclass, field
@@ -164,6 +166,32 @@ def judged(curve: Curve) -> bool:
     return not faults
 
 
+def write_csv(curves: list[Curve], path: Path) -> None:
+    """A row per mesh: all that `draw` needs."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["surface", "nodes", "mean_edge", *QUANTITIES])
+        for curve in curves:
+            for nodes, edge, rows in zip(curve.nodes, curve.edges, curve.errors, strict=True):
+                for row in rows:
+                    writer.writerow([curve.name, nodes, f"{edge:.6g}", *(f"{error:.4g}" for error in row)])
+
+
+def read_csv(path: Path) -> list[Curve]:
+    """The curves that `write_csv` wrote, without Newton steps."""
+    curves: dict[str, Curve] = {}
+    with path.open(newline="", encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            curve = curves.setdefault(row["surface"], Curve(row["surface"]))
+            if int(row["nodes"]) not in curve.nodes:
+                curve.nodes.append(int(row["nodes"]))
+                curve.edges.append(float(row["mean_edge"]))
+                curve.errors.append(np.empty((0, len(QUANTITIES))))
+            errors = [float(row[quantity]) for quantity in QUANTITIES]
+            curve.errors[-1] = np.vstack([curve.errors[-1], errors])
+    return list(curves.values())
+
+
 def draw(curves: list[Curve], path: Path) -> None:
     """Errors over h, logarithmic: left the foam, right the surface."""
     import matplotlib
@@ -217,13 +245,20 @@ def main() -> int:
     parser.add_argument("--bubbles", type=int, default=200)
     parser.add_argument("--order", type=int, default=8, help="of the films that are compared")
     parser.add_argument("--seeds", type=whole_numbers, default=[0, 1, 2], help="of random foams, such as 0-2")
+    parser.add_argument("--csv", type=Path, help="write the error of every mesh there")
+    parser.add_argument("--redraw", type=Path, help="measure nothing: take the errors from this file")
     parser.add_argument("--plot", type=Path, help="write a PNG of the errors")
     args = parser.parse_args()
+    if args.redraw:
+        draw(read_csv(args.redraw), args.plot or args.redraw.with_suffix(".png"))
+        return 0
     curves = [
         measure(name, args.nodes, args.meshes, args.bubbles, args.order, args.seeds) for name in args.surfaces
     ]
     print()
     good = [judged(curve) for curve in curves]
+    if args.csv:
+        write_csv(curves, args.csv)
     if args.plot:
         draw(curves, args.plot)
         print(f"wrote {args.plot}")

@@ -16,7 +16,17 @@ from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import Layer
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+WRITTEN = [
+    page
+    for page in sorted((ROOT / "docs").rglob("*.md"))
+    # the others are made by the build of the site
+    if page.relative_to(ROOT / "docs").parts[0] not in {"gallery", "reference", "_build"}
+]
+PAGES = [ROOT / "README.md", *WRITTEN]
+#: What the other tests, and those below, say; they name the pages that they run.
+TESTS = "".join(p.read_text(encoding="utf-8") for p in Path(__file__).parent.glob("test_*.py"))
+#: Pages with Python that no other test names.
+FREE = [p for p in WRITTEN if "\n```python\n" in p.read_text(encoding="utf-8") and f'"{p.name}"' not in TESTS]
 #: Lines that a surface may take in the how-to, blank ones not counted.
 MOST_LINES = 30
 
@@ -35,6 +45,13 @@ def run(page: Path) -> dict[str, Any]:
     for k, block in enumerate(blocks(page)):
         exec(compile(block, f"{page.name}, block {k}", "exec"), space)
     return space
+
+
+@pytest.mark.parametrize("page", FREE, ids=lambda page: page.stem)
+def test_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages check themselves, with ``assert`` where the text claims something."""
+    monkeypatch.chdir(tmp_path)
+    assert run(page)
 
 
 @pytest.fixture(scope="module")

@@ -66,7 +66,7 @@ def test_developers_get_the_fast_solver_where_there_is_one() -> None:
 
     extras = PROJECT["project"]["optional-dependencies"]
     (own,) = [r for text in extras["dev"] if (r := Requirement(text)).name == "warpedfoam"]
-    assert own.extras == {"fast", "formats", "test"}
+    assert own.extras == {"fast", "formats", "test", "docs"}
     (fast,) = [r for r in map(Requirement, extras["fast"]) if r.name == "pypardiso"]
     assert {Requirement(text).name for text in extras["fast"]} == {"numba", "pypardiso"}
     assert fast.marker is not None

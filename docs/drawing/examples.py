@@ -1,0 +1,126 @@
+"""Pictures and output of the gallery: every example is run as its page says, in a folder of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import nbclient
+import nbformat
+from concepts import relaxed
+
+import warpedfoam as wf
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+
+
+@contextlib.contextmanager
+def elsewhere() -> Iterator[Path]:
+    """A temporary folder to work in, with the folder "out" in it."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            Path("out").mkdir()
+            yield Path("out")
+        finally:
+            os.chdir(before)
+
+
+def module(name: str) -> Any:
+    """An example as a module."""
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made
+
+
+def run_script(name: str, arguments: tuple[Any, ...], picture: str | Callable[[Path, Path], None]) -> None:
+    """Keep what an example prints and its picture."""
+    target = ROOT / "docs" / "pictures" / f"example_{name}.png"
+    with elsewhere() as out:
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            module(name).main(*arguments)
+        if isinstance(picture, str):
+            target.write_bytes((out / picture).read_bytes())
+        else:
+            picture(out, target)
+    target.with_suffix(".txt").write_text(said.getvalue(), encoding="utf-8")
+
+
+def even_sphere(_out: Path, target: Path) -> None:
+    """The first of the random foams, with its clusters."""
+    cell = wf.HeleShawCell(wf.Sphere(radius=10.0), gap=0.5)
+    wf.save_figure(target, wf.plot_defects(relaxed(wf.voronoi_foam(cell, 100, seed=0))), dpi=110)
+
+
+def by_pressure(out: Path, target: Path) -> None:
+    """The foam that was written, read back."""
+    wf.save_picture(target, wf.load(out / "foam.npz"), color_by="pressure", dpi=110)
+
+
+#: Arguments as on the page, and the picture: a file that the example writes, or a function.
+SCRIPTS: dict[str, tuple[tuple[Any, ...], str | Callable[[Path, Path], None]]] = {
+    "01_first_foam_torus": (("out",), "torus.png"),
+    "02_defects_on_a_sphere": ((), even_sphere),
+    "03_export_ply": (("out",), by_pressure),
+    "04_defects_on_tori": ((), "charge_3.png"),
+    "05_polydispersity_ensemble": ((8, 150, "out", 0), "polydispersity.png"),
+    "06_scars_on_spheres": ((1, 400), "scars.png"),
+    "07_bubble_on_a_torus": ((), "torus_energy.png"),
+}
+
+
+def study(name: str, overrides: list[str]) -> None:
+    """One foam of a study."""
+    chosen = wf.read_study(EXAMPLES / f"{name}.toml", ["repeats=1", *overrides])
+    with tempfile.TemporaryDirectory() as folder:
+        done = wf.run_ensemble(chosen, folder, workers=0)
+        *_, foam = done.foams({"status": "converged"})
+        wf.save_picture(ROOT / "docs" / "pictures" / f"example_{name}.png", foam, dpi=110)
+
+
+def main_job() -> None:
+    """The foam of foam.toml."""
+    from warpedfoam.cli.app import app
+
+    target = ROOT / "docs" / "pictures" / "example_foam.png"
+    with elsewhere() as out:
+        app(["run", str(EXAMPLES / "foam.toml"), "-o", str(out), "--quiet"], standalone_mode=False)
+        target.write_bytes((out / "foam.png").read_bytes())
+
+
+#: Options that keep the pictures of studies small.
+STUDIES = {"polydispersity": ["foam.n_bubbles=100"], "schwarz_p": [], "tori": []}
+
+
+def notebook(name: str) -> None:
+    """Run a notebook and keep its pictures, numbered by cell; the notebook itself stays without output."""
+    import base64
+
+    sheet = nbformat.read(EXAMPLES / f"{name}.ipynb", as_version=4)
+    with elsewhere() as out:
+        nbclient.NotebookClient(sheet, timeout=120, resources={"metadata": {"path": str(out)}}).execute()
+    for k, cell in enumerate(sheet.cells):
+        for part in cell.get("outputs", []):
+            if "image/png" in part.get("data", {}):
+                path = ROOT / "docs" / "pictures" / f"example_{name}_{k}.png"
+                path.write_bytes(base64.b64decode(part["data"]["image/png"]))
+
+
+PICTURES: dict[str, Callable[[], None]] = {
+    **{name: (lambda n=name, a=args: run_script(n, *a)) for name, args in SCRIPTS.items()},
+    **{name: (lambda n=name, o=options: study(n, o)) for name, options in STUDIES.items()},
+    "foam": main_job,
+    "main_job": lambda: notebook("main_job"),
+}
