@@ -219,7 +219,8 @@ def test_packing_is_undone():
 # ------------------------------------------------------------------ colours
 
 
-@pytest.mark.parametrize("name", COLOR_CHOICES)
+# the colours of curvature reach as far as the surface's own, which the viewer shows too
+@pytest.mark.parametrize("name", [name for name in COLOR_CHOICES if name != "curvature"])
 @pytest.mark.parametrize("foam", [with_pressures(sphere_foam(60)), with_pressures(torus_foam())])
 def test_colours_are_those_of_the_pictures(foam, name):
     scalars = {s.name: s for s in bubble_scalars([foam], [np.ones(1)])}

@@ -78,13 +78,14 @@ from warpedfoam.plot import (
     plot_correlations,
     plot_defects,
     plot_foam,
+    plot_map,
     plot_order,
     plot_potential,
     plot_sides,
     save_figure,
     save_picture,
 )
-from warpedfoam.relax import LayeredRelaxation, Relaxation, relax
+from warpedfoam.relax import LayeredRelaxation, Relaxation, RelaxationHistory, relax
 from warpedfoam.studies import (
     Annealing,
     AnnealingHistory,
@@ -177,6 +178,7 @@ __all__ = [
     "PartitionTry",
     "PointGroup",
     "Relaxation",
+    "RelaxationHistory",
     "ResolutionError",
     "Revolution",
     "SchwarzP",
@@ -220,6 +222,7 @@ __all__ = [
     "plot_correlations",
     "plot_defects",
     "plot_foam",
+    "plot_map",
     "plot_order",
     "plot_potential",
     "plot_sides",

@@ -4,6 +4,7 @@ from warpedfoam.plot.charted import Charted
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
 from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
+from warpedfoam.plot.map_picture import plot_map
 from warpedfoam.plot.new_figures import figure_cylinder, figure_second_order
 from warpedfoam.plot.paper_figures import figure_curvature, figure_gap, figure_spheres, figure_torus_energy
 from warpedfoam.plot.potential_picture import plot_potential
@@ -24,6 +25,7 @@ __all__ = [
     "plot_correlations",
     "plot_defects",
     "plot_foam",
+    "plot_map",
     "plot_order",
     "plot_potential",
     "plot_sides",

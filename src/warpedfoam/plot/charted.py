@@ -5,18 +5,17 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_integer
-from warpedfoam.io.atomic import PathLike, atomic_binary, atomic_text, writable_path
+from warpedfoam.arrays import Floats
+from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
+from warpedfoam.plot.style import write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,17 +43,7 @@ class Charted:
         FileNotFoundError, IsADirectoryError
             If the path cannot be written.
         """
-        from matplotlib import rc_context
-
-        target = writable_path(path, suffixes=FORMATS)
-        dots = as_integer(dpi, "dpi", minimum=20, maximum=2400)
-        kind = target.suffix.lower().removeprefix(".")
-        metadata: dict[str, Any] = (
-            {} if kind == "png" else {"CreationDate" if kind == "pdf" else "Date": None}
-        )
-        with atomic_binary(target) as stream, rc_context({"svg.hashsalt": "warpedfoam"}):
-            self.figure.savefig(stream, format=kind, dpi=dots, metadata=metadata)
-        return target
+        return write_figure(path, self.figure, dpi)
 
     def write_csv(self, path: PathLike) -> Path:
         """Write the table, one row per line of the columns, in full precision.

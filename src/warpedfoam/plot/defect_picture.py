@@ -10,9 +10,12 @@ from warpedfoam.analysis import BondOrder, DefectReport, bond_order, defects
 from warpedfoam.arrays import Bools, Floats, Ints, as_instance, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.io.colours import BubbleColours, as_rgb, bubble_colours, ramp_rgb
-from warpedfoam.plot.foam_picture import Strokes, colour_bar, counted_sides, painted_foam
+from warpedfoam.plot.foam_picture import Strokes, painted_foam
+from warpedfoam.plot.legends import counted_sides, explain, put_legend
+from warpedfoam.plot.style import Style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Outlines of clusters by kind, told apart by colour-blind readers; single charges need none.
@@ -21,7 +24,7 @@ OUTLINES = {
     "scar": "#000000",
     "pleat": "#009e73",
     "vacancy": "#cc79a7",
-    "interstitial": "#cc79a7",
+    "interstitial": "#56b4e9",
     "neutral": "#f0e442",
     "aggregate": "#7a5195",
     "network": "#6d6d6d",
@@ -29,6 +32,8 @@ OUTLINES = {
 }
 _WIDE = 3.0
 _STAR = "#101014"
+#: Letters of an entry in the legend of clusters.
+_ENTRY = 16
 
 
 def plot_defects(
@@ -37,6 +42,7 @@ def plot_defects(
     *,
     view: tuple[float, float] | None = None,
     size: tuple[float, float] = (10.0, 6.4),
+    width: float | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the foam coloured by charge, its clusters outlined by kind, and Burgers vectors as arrows.
@@ -46,7 +52,7 @@ def plot_defects(
     foam : Foam
     report : DefectReport, optional
         Of this foam; found anew by default.
-    view, size, title
+    view, size, width, title
         As for `plot_foam`.
 
     Returns
@@ -69,10 +75,20 @@ def plot_defects(
             f"{foam.n_bubbles} bubbles, {len(found.disclinations.charge)} of them charged; "
             f"total charge {found.total_charge}"
         )
-    figure, _ = painted_foam(foam, colours, view=view, size=size, title=title, strokes=_outlines(foam, found))
-    counted_sides(figure, foam, colours, loc="outside right upper")
-    _kinds(figure, found)
-    return figure
+    painted = painted_foam(
+        foam,
+        colours,
+        view=view,
+        size=size,
+        width=width,
+        title=title,
+        strokes=outlines(foam, found),
+        legends=2,
+    )
+    counted_sides(painted.host(0), foam, colours, painted.style, "outside right upper")
+    kinds_legend(painted.host(1), found, painted.style)
+    painted.settle()
+    return painted.figure
 
 
 def plot_order(
@@ -81,6 +97,7 @@ def plot_order(
     *,
     view: tuple[float, float] | None = None,
     size: tuple[float, float] = (9.0, 6.2),
+    width: float | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the foam coloured by |ψ6|, with a star of three lines along the six directions to neighbours.
@@ -93,7 +110,7 @@ def plot_order(
     foam : Foam
     order : BondOrder, optional
         Of this foam; computed by default.
-    view, size, title
+    view, size, width, title
         As for `plot_foam`.
 
     Raises
@@ -117,14 +134,23 @@ def plot_order(
     )
     if title is None:
         title = f"{foam.n_bubbles} bubbles, mean |ψ6| {found.mean_magnitude:.3f}"
-    figure, axes = painted_foam(
-        foam, colours, view=view, size=size, title=title, strokes=_stars(foam, found, inside)
+    painted = painted_foam(
+        foam,
+        colours,
+        view=view,
+        size=size,
+        width=width,
+        title=title,
+        strokes=_stars(foam, found, inside),
+        legends=1,
     )
-    colour_bar(figure, axes, colours)
-    return figure
+    explain(painted.host(0), painted.axes, foam, colours, painted.style)
+    painted.settle()
+    return painted.figure
 
 
-def _outlines(foam: Foam, found: DefectReport) -> Strokes:
+def outlines(foam: Foam, found: DefectReport) -> Strokes:
+    """Outlines of clusters in the colours of their kinds, and Burgers vectors as arrows."""
     network, clusters = foam.network, found.clusters
     colour = (
         np.array([as_rgb(OUTLINES.get(kind, "#000000")) for kind in clusters.kind]).reshape(-1, 3) / 255.0
@@ -187,23 +213,16 @@ def _stars(foam: Foam, found: BondOrder, inside: Bools) -> Strokes:
     )
 
 
-def _kinds(figure: Figure, found: DefectReport) -> None:
+def kinds_legend(host: Figure | Axes, found: DefectReport, style: Style) -> None:
     """One entry per kind of cluster that occurs."""
     from matplotlib.lines import Line2D
 
     handles = []
     for name, count in found.kinds.items():
         if count and name in OUTLINES:
-            handles.append(Line2D([], [], color=OUTLINES[name], linewidth=_WIDE, label=f"{name}:  {count}"))
+            line = _WIDE * style.line
+            handles.append(Line2D([], [], color=OUTLINES[name], linewidth=line, label=f"{name}:  {count}"))
         elif count:
             handles.append(Line2D([], [], linestyle="none", label=f"{name}:  {count}"))
     if handles:
-        figure.legend(
-            handles=handles,
-            title="clusters",
-            loc="outside right lower",
-            frameon=False,
-            fontsize=11,
-            title_fontsize=11,
-            alignment="left",
-        )
+        put_legend(host, handles, "clusters", style, "outside right lower", _ENTRY)

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+import textwrap
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Floats, Ints, as_integer, as_number
 from warpedfoam.foam import Foam
-from warpedfoam.io.atomic import PathLike, atomic_binary, writable_path
+from warpedfoam.io.atomic import PathLike, writable_path
 from warpedfoam.io.colours import (
-    CHARGE_RANGE,
     FILM_COLOUR,
-    OUTSIDE_COLOUR,
-    RAMP,
     BubbleColours,
     as_rgb,
     bubble_colours,
-    charge_rgb,
-    ramp_rgb,
 )
 from warpedfoam.io.patches import Patches, bubble_patches
+from warpedfoam.plot.legends import explain
 from warpedfoam.plot.projection import View, back_to_front, facing, shades
+from warpedfoam.plot.stack import Stack
+from warpedfoam.plot.style import FORMATS, USUAL, Style, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,15 +36,16 @@ _MOST_VECTORS = 20_000
 PROPER = {"SchwarzP": "Schwarz P surface"}
 # Backs keep this share of their colour, the rest is this grey.
 BACK_SHARE, BACK_GREY = 0.25, 0.62
-FORMATS = (".png", ".svg", ".pdf")
 
 
 def plot_foam(
     foam: Foam,
-    color_by: str = "charge",
+    color_by: str | ArrayLike = "charge",
     *,
+    label: str | None = None,
     view: tuple[float, float] | None = None,
     size: tuple[float, float] = (9.0, 6.2),
+    width: float | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the bubbles as curved patches and the films as lines, hidden parts left out.
@@ -55,13 +56,18 @@ def plot_foam(
     Parameters
     ----------
     foam : Foam
-    color_by : {"charge", "pressure", "sides", "area"}, optional
+    color_by : {"charge", "pressure", "sides", "area", "volume", "curvature"} or (n_bubbles,) array, optional
         Charges and sides get a legend with counts over the whole foam, the others a colour bar.
+    label : str, optional
+        What the colours mean, with the unit; for arrays above all.
     view : (float, float), optional
         Elevation above the xy plane and azimuth from the x axis, in degrees. By default from the
         side and a little above, or well above for surfaces with holes.
     size : (float, float), optional
         Width and height in inches.
+    width : float, optional
+        Instead, the width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one
+        column. Letters are never below 6 points; legends stand below the foam on narrow figures.
     title : str, optional
         In place of the number of bubbles and the energy.
 
@@ -81,13 +87,11 @@ def plot_foam(
     -----
     O(n log n) in the number of triangles, about 70 per bubble for thousands of bubbles.
     """
-    colours = bubble_colours(foam, color_by)
-    figure, axes = painted_foam(foam, colours, view=view, size=size, title=title)
-    if colours.name in ("charge", "sides"):
-        counted_sides(figure, foam, colours)
-    else:
-        colour_bar(figure, axes, colours)
-    return figure
+    colours = bubble_colours(foam, color_by, label)
+    painted = painted_foam(foam, colours, view=view, size=size, width=width, title=title, legends=1)
+    explain(painted.host(0), painted.axes, foam, colours, painted.style)
+    painted.settle()
+    return painted.figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,46 +117,79 @@ class Strokes:
     mark_widths: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """A figure with a foam on ``axes``; a narrow one is stacked, its legends below the foam."""
+
+    figure: Figure
+    axes: Axes
+    style: Style
+    stack: Stack | None
+
+    def host(self, k: int) -> Figure | Axes:
+        """What carries the legend ``k``."""
+        return self.figure if self.stack is None else self.stack.feet[k]
+
+    def settle(self) -> None:
+        """Fit the height of a narrow figure."""
+        if self.stack is not None:
+            self.stack.settle()
+
+
 def painted_foam(
     foam: Foam,
     colours: BubbleColours,
     *,
     view: tuple[float, float] | None,
     size: tuple[float, float],
+    width: float | None = None,
     title: str | None,
     strokes: Strokes | None = None,
-) -> tuple[Figure, Axes]:
-    """Figure with the foam in these colours, and its axes; no legend yet."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    width, height = _pair(size, "size")
-    if min(width, height) < 1.0:
-        raise ValueError(f"size must be at least 1 inch each way, got {width:g} by {height:g}")
+    legends: int,
+) -> Painted:
+    """Figure with the foam in these colours; no legends yet, but room for so many."""
+    wide, high = _pair(size, "size")
+    if min(wide, high) < 1.0:
+        raise ValueError(f"size must be at least 1 inch each way, got {wide:g} by {high:g}")
     if title is not None and not isinstance(title, str):
         raise TypeError(f"title must be a string or None, got {type(title).__name__}")
     chosen = None if view is None else _pair(view, "view")
+    if width is None:
+        style = Style.of(None, float(np.clip(25.4 * wide, 40.0, 1000.0)))
+        style = replace(style, narrow=False)
+    else:
+        style = Style.of(width)
+        high = style.width * high / wide
     segments, rings = _resolution(foam.n_bubbles)
     patches = bubble_patches(foam, curve_points=segments + 1, rings=rings)
     elevation, azimuth = _default_view(foam, patches) if chosen is None else chosen
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    axes.set_aspect("equal")
+    stack = Stack.of(style, legends) if style.narrow else None
+    if stack is not None:
+        figure, axes = stack.figure, stack.axes
+    else:
+        figure = replace(style, width=wide if width is None else style.width).figure(high)
+        axes = figure.add_subplot()
+        axes.set_aspect("equal")
     axes.set_axis_off()
-    _paint(axes, foam, patches, colours, View.from_angles(elevation, azimuth), segments, strokes)
-    axes.set_title(_heading(foam) if title is None else title, fontsize=13)
-    return figure, axes
+    thin = _film_width(foam.n_bubbles) * min(1.0, style.width / (USUAL / 25.4)) ** 0.6
+    _paint(axes, foam, patches, colours, View.from_angles(elevation, azimuth), segments, strokes, thin)
+    text = heading(foam) if title is None else title
+    if style.narrow:
+        text = textwrap.fill(text, int(72.0 * style.width / (0.56 * style.title)))
+    axes.set_title(text, fontsize=style.title)
+    return Painted(figure, axes, style, stack)
 
 
 def save_picture(
     path: PathLike,
     foam: Foam,
-    color_by: str = "charge",
+    color_by: str | ArrayLike = "charge",
     *,
+    label: str | None = None,
     view: tuple[float, float] | None = None,
     size: tuple[float, float] = (9.0, 6.2),
+    width: float | None = None,
     title: str | None = None,
     dpi: int = 160,
 ) -> Path:
@@ -163,7 +200,7 @@ def save_picture(
     path : str or path
         Ends in ``.png``, ``.svg`` or ``.pdf``.
     foam : Foam
-    color_by, view, size, title
+    color_by, label, view, size, width, title
         As for `plot_foam`.
     dpi : int, optional
         Dots per inch.
@@ -182,28 +219,21 @@ def save_picture(
     """
     writable_path(path, suffixes=FORMATS)
     as_integer(dpi, "dpi", minimum=20, maximum=2400)
-    figure = plot_foam(foam, color_by, view=view, size=size, title=title)
+    figure = plot_foam(foam, color_by, label=label, view=view, size=size, width=width, title=title)
     return save_figure(path, figure, dpi=dpi)
 
 
 def save_figure(path: PathLike, figure: Figure, *, dpi: int = 160) -> Path:
     """Write a figure as PNG, SVG or PDF, by the ending of ``path``; the same figure gives the same file.
 
+    Text stays text in SVG and PDF. Foams of more than 20 000 triangles and films are an image in them.
+
     Raises
     ------
     TypeError, ValueError, FileNotFoundError, IsADirectoryError
         As `save_picture`.
     """
-    from matplotlib import rc_context
-
-    target = writable_path(path, suffixes=FORMATS)
-    dots = as_integer(dpi, "dpi", minimum=20, maximum=2400)
-    kind = target.suffix.lower().removeprefix(".")
-    # no dates and no random names: the same foam gives the same file
-    metadata: dict[str, Any] = {} if kind == "png" else {"CreationDate" if kind == "pdf" else "Date": None}
-    with atomic_binary(target) as stream, rc_context({"svg.hashsalt": "warpedfoam"}):
-        figure.savefig(stream, format=kind, dpi=dots, metadata=metadata)
-    return target
+    return write_figure(path, figure, dpi)
 
 
 def _pair(value: object, name: str) -> tuple[float, float]:
@@ -235,6 +265,7 @@ def _paint(
     view: View,
     segments: int,
     strokes: Strokes | None,
+    thin: float,
 ) -> None:
     """Triangles and film segments in one collection, farthest first."""
     from matplotlib.collections import PolyCollection
@@ -272,7 +303,6 @@ def _paint(
     np.maximum.at(span, patches.triangle_bubble[seen], np.ptp(corners[:, :, 2], axis=1))
     beside = np.maximum(span[foam.network.left], span[foam.network.right])[film]
     lift = np.repeat(beside, segments)[towards] + np.ptp(pieces[:, :, 2], axis=1)
-    thin = _film_width(foam.n_bubbles)
     ink = np.tile(as_rgb(FILM_COLOUR) / 255.0, (len(film), 1))
     widths = np.full(len(film), thin)
     if strokes is not None and special is not None:
@@ -324,77 +354,10 @@ def _film_width(n_bubbles: int) -> float:
     return float(np.clip(1.3 * (100.0 / n_bubbles) ** 0.3, 0.35, 1.3))
 
 
-def _heading(foam: Foam) -> str:
+def heading(foam: Foam) -> str:
+    """Number of bubbles, surface and energy."""
     name = type(foam.cell.surface).__name__
     kind = PROPER.get(name) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     article = "an" if kind[0] in "aeiou" else "a"
     count = int((foam.network.bubble_euler == 1).sum())
     return f"{count} bubble{'' if count == 1 else 's'} on {article} {kind} · energy {foam.energy:.6g}"
-
-
-def counted_sides(
-    figure: Figure,
-    foam: Foam,
-    colours: BubbleColours,
-    loc: Literal["outside right center", "outside right upper"] = "outside right center",
-) -> None:
-    """One entry per number of sides that occurs, with how many bubbles have it."""
-    from matplotlib.patches import Patch
-
-    # away from walls a bubble of n sides has the charge 6 − n; at them both do not go together
-    walled = len(foam.network.walls) > 0
-    found = 6 - foam.network.charges if colours.name == "charge" else foam.network.sides
-    sides, counts = np.unique(found[colours.inside], return_counts=True)
-    by_charge = colours.name == "charge"
-    entries: list[tuple[Floats, str]] = []
-    rgb = (
-        charge_rgb((6 - sides).astype(np.float64))
-        if by_charge
-        else ramp_rgb(sides.astype(np.float64), colours.limits)
-    )
-    ends = np.clip(sides, 6 - CHARGE_RANGE, 6 + CHARGE_RANGE) if by_charge else sides
-    for end in np.unique(ends):
-        same = ends == end
-        least, most = int(sides[same].min()), int(sides[same].max())
-        name = f"n = {least}" if least == most else f"n = {least} … {most}"
-        if by_charge and walled:
-            name = f"q = {_signed(6 - least)}" + ("" if least == most else f" … {_signed(6 - most)}")
-        elif by_charge:
-            charge = f"q = {_signed(6 - least)}"
-            name += f"  ({charge})" if least == most else f"  ({charge} … {_signed(6 - most)})"
-        entries.append((rgb[same][0] / 255.0, f"{name}:  {int(counts[same].sum())}"))
-    outside = int((~colours.inside).sum())
-    if outside:
-        entries.append((as_rgb(OUTSIDE_COLOUR) / 255.0, f"exterior:  {outside}"))
-    title = "sides n, charge q = 6 − n:  bubbles" if by_charge else "sides n:  bubbles"
-    if by_charge and walled:
-        title = "charge q = 6 − films − 2 walls:  bubbles"
-    figure.legend(
-        handles=[Patch(facecolor=tuple(c), edgecolor="#555555", linewidth=0.6, label=t) for c, t in entries],
-        title=title,
-        loc=loc,
-        frameon=False,
-        fontsize=11,
-        title_fontsize=11,
-        alignment="left",
-    )
-
-
-def _signed(charge: int) -> str:
-    return "0" if charge == 0 else f"{'+' if charge > 0 else '−'}{abs(charge)}"
-
-
-def colour_bar(figure: Figure, axes: Axes, colours: BubbleColours) -> None:
-    """Colour bar of values on the ramp."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LinearSegmentedColormap, Normalize
-
-    low, high = colours.limits
-    if not high - low > 1e-9 * max(abs(low), abs(high)):
-        half = 0.5 * abs(low) or 0.5  # one value: it sits in the middle of the bar
-        low, high = low - half, high + half
-    ramp = LinearSegmentedColormap.from_list("ramp", RAMP)
-    bar = figure.colorbar(ScalarMappable(Normalize(low, high), ramp), ax=axes, shrink=0.7, pad=0.03)
-    bar.set_label(colours.label, fontsize=12)
-    bar.ax.tick_params(labelsize=11)
-    bar.outline.set_linewidth(0.6)

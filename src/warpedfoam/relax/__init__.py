@@ -2,6 +2,6 @@
 
 from warpedfoam.relax.driver import relax
 from warpedfoam.relax.layered import LayeredRelaxation
-from warpedfoam.relax.result import Relaxation
+from warpedfoam.relax.result import Relaxation, RelaxationHistory
 
-__all__ = ["LayeredRelaxation", "Relaxation", "relax"]
+__all__ = ["LayeredRelaxation", "Relaxation", "RelaxationHistory", "relax"]

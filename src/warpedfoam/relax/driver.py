@@ -16,7 +16,7 @@ from warpedfoam.relax.held import moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.layered import relax_layers, require_lines
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
-from warpedfoam.relax.result import Relaxation
+from warpedfoam.relax.result import Relaxation, RelaxationHistory
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
 from warpedfoam.relax.system import (
     Linearised,
@@ -66,6 +66,7 @@ class _Run:
     pins: np.ndarray
     iteration: int = 0
     events: list[T1Event] = field(default_factory=list)
+    rows: list[tuple[int, float, float, float, int, bool]] = field(default_factory=list)
     is_minimum: bool = False
     fault: str = ""
     share: float = 1.0
@@ -183,6 +184,7 @@ def relax(
         is_minimum=run.is_minimum,
         iterations=run.iteration,
         events=tuple(run.events),
+        history=_history(run.rows),
         timings=MappingProxyType(dict(system.timings)),
         message=_message(converged, residuals, run, tol, limit),
     )
@@ -235,12 +237,14 @@ def _iterate(
             condensed = lin.condensed(positive=False)
             run.is_minimum = _is_minimum(lin, _kkt(run, lin, condensed, LEAST_SHIFT), condensed)
             if run.is_minimum or run.iteration >= limit:
+                _note(run, lin, exact)
                 return now, done and run.is_minimum
         error = float(np.abs(now.volume / run.system.shares).max())
         if not exact:
             exact = now.force < EXACT_BELOW and error < EXACT_BELOW
         elif now.force > EXACT_ABOVE:
             exact = False
+        _note(run, lin, exact)
         try:
             if exact:
                 _exact_step(run, lin)
@@ -250,6 +254,25 @@ def _iterate(
             run.fault = SINGULAR
             return now, False
         run.iteration += 1
+
+
+def _note(run: _Run, lin: Linearised, exact: bool) -> None:
+    """Book the state that is about to be left, or that the run ends in."""
+    now = lin.residuals
+    energy = run.foam.tension * float(lin.area.sum())
+    run.rows.append((run.iteration, energy, now.force, now.volume_error, len(run.events), exact))
+
+
+def _history(rows: list[tuple[int, float, float, float, int, bool]]) -> RelaxationHistory:
+    iteration, energy, residual, volume_error, n_t1, exact = zip(*rows, strict=True) if rows else [()] * 6
+    return RelaxationHistory(
+        frozen(np.array(iteration, dtype=np.int64)),
+        frozen(np.array(energy, dtype=np.float64)),
+        frozen(np.array(residual, dtype=np.float64)),
+        frozen(np.array(volume_error, dtype=np.float64)),
+        frozen(np.array(n_t1, dtype=np.int64)),
+        frozen(np.array(exact, dtype=np.bool_)),
+    )
 
 
 def _proximal_step(run: _Run, lin: Linearised) -> None:

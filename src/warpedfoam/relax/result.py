@@ -5,9 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from warpedfoam.arrays import Floats
+from warpedfoam.arrays import Bools, Floats, Ints
 from warpedfoam.foam import Foam
 from warpedfoam.moves.t1 import T1Event
+
+
+@dataclass(frozen=True, eq=False)
+class RelaxationHistory:
+    """The states that a relaxation went through, the start first; arrays (n_states,).
+
+    Of a foam with bulging films it is the history of the ruled foam that they start from.
+
+    Attributes
+    ----------
+    iteration : (n_states,) integer array
+        Steps tried before the state; where one was taken back, the state before it stands again.
+    energy : (n_states,) array
+        γ Σ film areas. It may rise: volumes are being corrected.
+    residual, volume_error : (n_states,) array
+        As in `Relaxation`; volumes are rough on some surfaces as long as ``exact`` is False.
+    n_t1 : (n_states,) integer array
+        T1s made before the state.
+    exact : (n_states,) array of bool
+        Whether the step from the state is Newton's, on the KKT system.
+    """
+
+    iteration: Ints
+    energy: Floats
+    residual: Floats
+    volume_error: Floats
+    n_t1: Ints
+    exact: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +64,8 @@ class Relaxation:
         Newton steps taken.
     events : tuple of T1Event
         Every T1 made, in order.
+    history : RelaxationHistory
+        Energy, residual, volume error and T1s step by step.
     timings : mapping of str to float
         Seconds by kind of work: ``"assemble"``, ``"solve"``, ``"pattern"``, ``"t1"``, ``"total"``.
     message : str
@@ -51,6 +81,7 @@ class Relaxation:
     is_minimum: bool
     iterations: int
     events: tuple[T1Event, ...]
+    history: RelaxationHistory
     timings: Mapping[str, float]
     message: str
 

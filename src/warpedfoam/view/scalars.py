@@ -17,6 +17,7 @@ from warpedfoam.io.colours import (
     as_rgb,
     bubble_colours,
     charge_rgb,
+    diverging_rgb,
     ramp_rgb,
 )
 
@@ -65,22 +66,6 @@ class Scalar:
         if self.kind in ("charge", "diverging"):
             return charge_rgb(np.arange(-CHARGE_RANGE, CHARGE_RANGE + 1.0))
         return np.stack([as_rgb(colour) for colour in RAMP])
-
-
-def diverging_rgb(values: Floats, limit: float) -> Bytes:
-    """Colours (n, 3) between −``limit`` and ``limit``, through the colours of the charges −3 … 3.
-
-    Positive curvature is red, as the positive charges are that it attracts.
-
-    Examples
-    --------
-    >>> diverging_rgb(np.array([-1.0, 0.0, 1.0]), 1.0).tolist()
-    [[22, 63, 128], [236, 236, 234], [140, 19, 34]]
-    """
-    table = charge_rgb(np.arange(-CHARGE_RANGE, CHARGE_RANGE + 1.0)).astype(np.float64)
-    t = np.clip(values / limit, -1.0, 1.0)
-    place = np.linspace(-1.0, 1.0, len(table))
-    return np.round(np.stack([np.interp(t, place, table[:, k]) for k in range(3)], axis=1)).astype(np.uint8)
 
 
 def bubble_scalars(foams: Sequence[Foam], curvatures: Sequence[Floats]) -> tuple[Scalar, ...]:
