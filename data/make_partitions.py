@@ -2,9 +2,10 @@
 
     python data/make_partitions.py [STATE_FOLDER] [STARTS] [N ...]
 
-At most 60 starts for each of n = 2 … 32 and 72 by default; about half an hour on one core. States are kept
-in the folder, so that a run that was stopped goes on, and a later one may make more starts; rows of other n
-in the table stay. A search ends early once the known length is reached.
+60 starts for each of n = 2 … 32 and 72 by default, whether or not a known length is met on the way; one to
+two hours on one core. The state is kept in the folder after every start: a run that was stopped goes on, and
+a later one may make more starts. Rows are gathered in the folder's `rows.csv`; the table is written from it
+once all n are there, so that all its rows come from one run.
 """
 
 from __future__ import annotations
@@ -26,24 +27,29 @@ KNOWN = {
     6: 12.0 * np.arccos(1.0 / 3.0), 7: 16.35196950, 8: 17.69270805, 9: 18.85041320, 10: 19.99976253,
     12: 21.89182969, 14: 23.95812912, 20: 28.99917241,
 }  # fmt: skip
-SEED, BATCH, HOPS = 6, 15, 20
+SEED, HOPS = 6, 20
+NUMBERS = (*range(2, 33), 72)
 COLUMNS = (
     "n", "length", "known", "difference", "check", "group", "group_order", "sides",
     "starts", "failed", "reached", "hops", "seed", "residual", "seconds",
 )  # fmt: skip
 
 
-def search(n: int, folder: Path, most: int, spent: float) -> dict[str, object]:
-    """The row of n; ``spent`` are the seconds that earlier runs took."""
-    began = time.perf_counter()
+def search(n: int, folder: Path, starts: int) -> dict[str, object]:
+    """The row of n; seconds are those of the processor, earlier runs of this search included."""
+    state = folder / f"n{n}"
+    clock = state / "seconds.txt"
+    spent = float(clock.read_text(encoding="utf-8")) if clock.exists() else 0.0
+    began = time.process_time()
+
+    def keep(stage: str, fraction: float) -> None:
+        clock.write_text(f"{spent + time.process_time() - began:.1f}", encoding="utf-8")
+
     known = KNOWN.get(n)
-    for starts in range(BATCH, most + 1, BATCH):
-        found = wf.minimal_partition(
-            wf.Sphere(1.0), n, seed=SEED, starts=starts, hops=HOPS, folder=folder / f"n{n}"
-        )
-        if known is not None and found.length < known + 1e-8:
-            break
-    seconds = time.perf_counter() - began + spent
+    found = wf.minimal_partition(
+        wf.Sphere(1.0), n, seed=SEED, starts=starts, hops=HOPS, folder=state, progress=keep
+    )
+    seconds = spent + time.process_time() - began
     # films of the highest order in use anywhere: tells whether order 10 was enough
     fine = wf.relax(found.foam, order=16)
     threefold = (found.foam.network.vertex_degrees == 3).all()
@@ -69,21 +75,31 @@ def search(n: int, folder: Path, most: int, spent: float) -> dict[str, object]:
     }
 
 
-def main(folder: str = "out/partitions", most: str = "60", *numbers: str) -> None:
+def read(path: Path) -> dict[int, dict[str, object]]:
+    """Rows by n."""
+    if not path.exists():
+        return {}
+    with path.open(encoding="utf-8", newline="") as stream:
+        return {int(row["n"]): dict(row) for row in csv.DictReader(stream)}
+
+
+def write(path: Path, rows: dict[int, dict[str, object]]) -> None:
+    with atomic_text(path) as stream:
+        writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows[k] for k in sorted(rows))
+
+
+def main(folder: str = "out/partitions", starts: str = "60", *numbers: str) -> None:
     state = Path(folder)
     state.mkdir(parents=True, exist_ok=True)
-    rows: dict[int, dict[str, object]] = {}
-    if TABLE.exists():
-        with TABLE.open(encoding="utf-8", newline="") as stream:
-            rows = {int(row["n"]): dict(row) for row in csv.DictReader(stream)}
-    for n in map(int, numbers) if numbers else (*range(2, 33), 72):
-        spent = float(str(rows[n]["seconds"])) if n in rows and (state / f"n{n}").exists() else 0.0
-        rows[n] = search(n, state, int(most), spent)
-        print("  ".join(f"{k} {rows[n][k]}" for k in COLUMNS), flush=True)
-        with atomic_text(TABLE) as stream:
-            writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows[k] for k in sorted(rows))
+    for n in map(int, numbers) if numbers else NUMBERS:
+        row = search(n, state, int(starts))
+        print("  ".join(f"{k} {row[k]}" for k in COLUMNS), flush=True)
+        rows = {**read(state / "rows.csv"), n: row}
+        write(state / "rows.csv", rows)
+        if {*NUMBERS} <= {*rows}:
+            write(TABLE, rows)
 
 
 if __name__ == "__main__":

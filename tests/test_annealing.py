@@ -32,7 +32,7 @@ def same(one: wf.Annealing, two: wf.Annealing) -> None:
     assert one.energy == two.energy
     assert fingerprint(one.foam) == fingerprint(two.foam)
     assert fingerprint(one.last) == fingerprint(two.last)
-    for name in ("move", "temperature", "proposed", "accepted", "n_t1", "energy", "best"):
+    for name in ("move", "temperature", "proposed", "accepted", "n_t1", "energy", "best", "tried", "taken"):
         np.testing.assert_array_equal(getattr(one.history, name), getattr(two.history, name))
 
 
@@ -78,7 +78,7 @@ def test_a_move_ends_at_a_minimum_with_the_same_volumes(start: wf.Foam, move: st
 
 
 def test_history_tells_what_happened(start: wf.Foam) -> None:
-    found = wf.anneal(start, steps=25, seed=3, temperature=1.0, width=0.5)
+    found = wf.anneal(start, steps=25, moves=MOVES, seed=3, temperature=1.0, width=0.5)
     h = found.history
     before = np.concatenate([[found.start_energy], h.energy[:-1]])
     np.testing.assert_array_equal(h.best, np.minimum.accumulate(np.minimum(h.energy, found.start_energy)))

@@ -103,13 +103,23 @@ def test_polydispersity_ensemble(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_scars_on_spheres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scars = example("06_scars_on_spheres")
-    monkeypatch.setattr(scars, "WORK", 1000)
-    (row,) = scars.main(1, 100, tmp_path)
-    # too small for scars: twelve fives
-    assert row["clusters of charge 1"] == 12
-    assert row["excess pairs"] <= 2
-    assert row["energy"] <= row["start energy"]
+    monkeypatch.setattr(scars, "COOLING_STEPS", 800)
+    monkeypatch.setattr(scars, "STEPS", 4)
+    monkeypatch.setattr(scars, "SIZES", (100,))
+    rows = scars.main(2, 100, tmp_path)
+    for row in rows:
+        # too small for scars: twelve fives, two of which may share a seven
+        assert row["clusters of charge 1"] >= 10
+        assert row["excess pairs"] <= 2
+        assert row["gained by annealing"] >= 0.0
     assert (tmp_path / "scars.png").stat().st_size > 10_000
+    # nothing is made twice, and error bars are those of the mean
+    monkeypatch.setattr(scars, "scars_of", None)
+    again = scars.main(2, 100, tmp_path)
+    assert [r["length"] for r in again] == pytest.approx([r["length"] for r in rows], rel=1e-12)
+    ((_, mean, error),) = scars.means(rows, "length")
+    one, two = (r["length"] for r in rows)
+    assert (mean, error) == pytest.approx(((one + two) / 2.0, abs(one - two) / 2.0))
 
 
 def test_bubble_on_a_torus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

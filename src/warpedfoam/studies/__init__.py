@@ -15,6 +15,7 @@ from warpedfoam.studies.potential import (
 )
 from warpedfoam.studies.study import Study, read_study
 from warpedfoam.studies.thomson import ThomsonPoints, thomson_points
+from warpedfoam.studies.warm_points import anneal_points
 
 __all__ = [
     "Annealing",
@@ -29,6 +30,7 @@ __all__ = [
     "Study",
     "ThomsonPoints",
     "anneal",
+    "anneal_points",
     "bubble_between_plates",
     "cluster_clearance",
     "cluster_foam",

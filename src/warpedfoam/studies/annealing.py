@@ -22,9 +22,10 @@ from warpedfoam.arrays import (
 from warpedfoam.errors import ConvergenceError
 from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.io.atomic import PathLike
-from warpedfoam.relax import relax
+from warpedfoam.relax import Relaxation, relax
 from warpedfoam.studies.checkpoint import Checkpoint, fingerprint
 from warpedfoam.studies.foam_moves import MOVES, moved
+from warpedfoam.studies.many_moves import many_moves
 
 #: Energies that differ by less than this share are the same minimum.
 SAME = 1e-9
@@ -37,18 +38,20 @@ class AnnealingHistory:
     Attributes
     ----------
     move : (n_steps,) array of str
-        ``"t1"``, ``"pair"``, ``"glide"`` or ``"shake"``.
+        ``"t1"``, ``"pair"``, ``"glide"``, ``"wander"`` or ``"shake"``.
     temperature : (n_steps,) array
         In units of γ d ℓ.
     proposed : (n_steps,) array
-        Energy of the relaxed proposal; NaN where the move failed (it could not be made, or the foam did
-        not converge).
+        Energy of the relaxed proposal, all its moves made; NaN where the move failed (it could not be
+        made, or the foam did not converge).
     accepted : (n_steps,) array of bool
         Whether it was taken, back to the same minimum included.
     n_t1 : (n_steps,) array
         T1s of the final relaxation, besides those of the move itself.
     energy, best : (n_steps,) array
         Of the present foam and of the best one after the step.
+    tried, taken : (n_steps,) array of int
+        Moves that were made at once, and those of them that the present foam has kept.
     """
 
     move: NDArray[np.str_]
@@ -58,6 +61,8 @@ class AnnealingHistory:
     n_t1: Ints
     energy: Floats
     best: Floats
+    tried: Ints
+    taken: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +100,8 @@ def anneal(
     foam: Foam,
     *,
     steps: int = 100,
-    moves: Sequence[str] = MOVES,
+    moves: Sequence[str] = ("t1", "pair", "glide", "shake"),
+    sites: int = 1,
     temperature: float = 0.05,
     cooling: float = 0.01,
     width: float = 0.3,
@@ -117,10 +123,16 @@ def anneal(
     foam : Foam
         Relaxed or not.
     steps : int, optional
-    moves : sequence of {"t1", "pair", "glide", "shake"}, optional
+    moves : sequence of {"t1", "pair", "glide", "wander", "shake"}, optional
         Drawn with equal chances: a T1 on a random film; two T1s beside each other (moving, making or
         removing dislocations); a T1 on a film drawn from those where Σ q² would not rise (dislocations
-        glide or annihilate: what large foams need); a cycle of polydispersity, which shakes the whole foam.
+        glide or annihilate); two T1s of which the first is on a film round a charged bubble; a cycle of
+        polydispersity, which shakes the whole foam. Large foams need ``"glide"`` and ``"wander"``.
+    sites : int, optional
+        Moves per step, at least six bubble sizes apart: as many as there is room for, up to this number.
+        They are relaxed together; those are kept whose regions' energies pass the test, each with a random
+        number of its own, and the foam with these is relaxed once more and compared with the one before.
+        A shake is one move whatever this is.
     temperature : float, optional
         Of the first step, in units of γ d ℓ; 0 takes no step uphill.
     cooling : float, optional
@@ -160,6 +172,7 @@ def anneal(
     count = as_integer(steps, "steps", minimum=0, maximum=10_000_000)
     kinds = _moves(moves)
     heat = as_number(temperature, "temperature", minimum=0.0, maximum=1e6)
+    at_once = as_integer(sites, "sites", minimum=1, maximum=1_000_000)
     ratio = as_number(cooling, "cooling", positive=True, maximum=1.0)
     spread = as_number(width, "width", positive=True, maximum=1.0)
     p = as_integer(foam.order if order is None else order, "order", minimum=2, maximum=MAX_ORDER)
@@ -172,6 +185,7 @@ def anneal(
             "start": fingerprint(foam),
             "steps": count,
             "moves": list(kinds),
+            "sites": at_once,
             "temperature": heat,
             "cooling": ratio,
             "width": spread,
@@ -191,7 +205,7 @@ def anneal(
         cooled = ratio ** (k / max(count - 1, 1))
         rng = np.random.default_rng([start_seed, k])
         move = kinds[int(rng.integers(len(kinds)))]
-        walk.step(move, rng, heat * cooled, unit, spread * float(np.sqrt(cooled)), p)
+        walk.step(move, rng, heat * cooled, unit, spread * float(np.sqrt(cooled)), p, at_once)
         if checkpoint is not None:
             checkpoint.write(walk.state(), walk.foams())
         if progress is not None:
@@ -216,23 +230,37 @@ class _Walk:
     rows: list[list[Any]]
 
     def step(
-        self, move: str, rng: np.random.Generator, heat: float, unit: float, width: float, order: int
+        self,
+        move: str,
+        rng: np.random.Generator,
+        heat: float,
+        unit: float,
+        width: float,
+        order: int,
+        sites: int,
     ) -> None:
         """Propose, relax, and take or leave it."""
-        chance = float(rng.random())
         energy = self.now.energy
-        trial = moved(self.now, move, rng, width, order)
-        proposed: float | None = None
-        n_t1, accepted = 0, False
-        if trial is not None and trial.converged:
-            proposed, n_t1 = trial.energy, trial.n_t1
-            rise = proposed - energy
-            accepted = rise <= 0.0 or (heat > 0.0 and chance < float(np.exp(-rise / (heat * unit))))
-            if accepted and abs(rise) > SAME * energy:
-                self.now = trial.foam
-                if proposed < self.best.energy:
-                    self.best = trial.foam
-        self.rows.append([move, heat, proposed, accepted, n_t1, self.now.energy, self.best.energy])
+        result: Relaxation | None
+        if sites == 1 or move == "shake":
+            chance = float(rng.random())
+            result = moved(self.now, move, rng, width, order)
+            if result is not None and not result.converged:
+                result = None
+            proposed = None if result is None else result.energy
+            allowance = -heat * unit * float(np.log(max(chance, 1e-300)))
+            tried = taken = 1
+        else:
+            many = many_moves(self.now, move, rng, sites, heat, unit, order)
+            result, allowance, tried, taken = many.result, many.allowance, many.tried, many.taken
+            proposed = None if many.rise is None else energy + many.rise
+        accepted = result is not None and result.energy - energy <= allowance
+        if result is not None and accepted and abs(result.energy - energy) > SAME * energy:
+            self.now = result.foam
+            if result.energy < self.best.energy:
+                self.best = result.foam
+        row = [move, heat, proposed, accepted, 0 if result is None else result.n_t1, self.now.energy]
+        self.rows.append([*row, self.best.energy, tried, taken if accepted else 0])
 
     def state(self) -> Mapping[str, Any]:
         return {"start_energy": self.start_energy, "rows": self.rows}
@@ -257,7 +285,7 @@ def _moves(moves: object) -> tuple[str, ...]:
 
 
 def _history(rows: list[list[Any]]) -> AnnealingHistory:
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 7
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 9
     proposed = [np.nan if e is None else e for e in columns[2]]
     return AnnealingHistory(
         frozen(np.array(columns[0], dtype=np.str_)),
@@ -267,4 +295,6 @@ def _history(rows: list[list[Any]]) -> AnnealingHistory:
         frozen(np.array(columns[4], dtype=np.int64)),
         frozen(np.array(columns[5], dtype=np.float64)),
         frozen(np.array(columns[6], dtype=np.float64)),
+        frozen(np.array(columns[7], dtype=np.int64)),
+        frozen(np.array(columns[8], dtype=np.int64)),
     )

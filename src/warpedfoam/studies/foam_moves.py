@@ -14,7 +14,9 @@ from warpedfoam.moves.t1 import allowed, t1_sites
 from warpedfoam.network import CellNetwork
 from warpedfoam.relax import Relaxation, relax
 
-MOVES = ("t1", "pair", "glide", "shake")
+MOVES = ("t1", "pair", "glide", "wander", "shake")
+#: Moves of two T1s.
+TWICE = ("pair", "wander")
 #: Tolerance where only the way to the next state is relaxed, and most steps of any relaxation.
 ROUGH, STEPS = 1e-4, 300
 
@@ -26,10 +28,11 @@ def moved(foam: Foam, move: str, rng: np.random.Generator, width: float, order: 
     ----------
     foam : Foam
         Relaxed.
-    move : {"t1", "pair", "glide", "shake"}
+    move : {"t1", "pair", "glide", "wander", "shake"}
         One T1 on a film drawn at random; two, the second beside the first; one on a film where Σ q² would
-        not rise; or a cycle of polydispersity: relax with volumes times log-normal factors of this
-        ``width`` (standard deviation of ln V), then with the old volumes.
+        not rise; two, the first on a film round a charged bubble; or a cycle of polydispersity: relax
+        with volumes times log-normal factors of this ``width`` (standard deviation of ln V), then
+        with the old volumes.
     rng : numpy.random.Generator
     width : float
     order : int
@@ -38,10 +41,11 @@ def moved(foam: Foam, move: str, rng: np.random.Generator, width: float, order: 
     if move == "shake":
         return _shaken(foam, rng, width, order)
     turned = _turned(foam, rng, move)
-    return None if turned is None else _relaxed(turned, order)
+    return None if turned is None else relaxed_or_none(turned, order)
 
 
-def _relaxed(foam: Foam, order: int, tolerance: float = 1e-10) -> Relaxation | None:
+def relaxed_or_none(foam: Foam, order: int, tolerance: float = 1e-10) -> Relaxation | None:
+    """The relaxed foam, or None if the way there broke down."""
     try:
         return relax(foam, order=order, tolerance=tolerance, max_iterations=STEPS, solver="superlu")
     except (WarpedFoamError, ValueError, FloatingPointError):
@@ -51,18 +55,17 @@ def _relaxed(foam: Foam, order: int, tolerance: float = 1e-10) -> Relaxation | N
 def _shaken(foam: Foam, rng: np.random.Generator, width: float, order: int) -> Relaxation | None:
     volumes = foam.target_volumes * np.exp(width * rng.standard_normal(foam.n_bubbles))
     volumes *= foam.target_volumes.sum() / volumes.sum()
-    there = _relaxed(replace(foam, target_volumes=volumes, pressures=None), order, ROUGH)
+    there = relaxed_or_none(replace(foam, target_volumes=volumes, pressures=None), order, ROUGH)
     if there is None or not np.isfinite(there.residual):
         return None
-    return _relaxed(replace(there.foam, target_volumes=foam.target_volumes, pressures=None), order)
+    return relaxed_or_none(replace(there.foam, target_volumes=foam.target_volumes, pressures=None), order)
 
 
 def _turned(foam: Foam, rng: np.random.Generator, move: str) -> Foam | None:
     """The foam after a T1 on a random film, and in a pair a second on one of the films round it."""
-    fine = turnable(foam.network)
-    choice = np.flatnonzero(fine & (charge_rise(foam.network) <= 0) if move == "glide" else fine)
+    choice = np.flatnonzero(candidates(foam.network, move))
     try:
-        for _ in range(2 if move == "pair" else 1):
+        for _ in range(2 if move in TWICE else 1):
             if not choice.size:
                 return None
             film = int(rng.choice(choice))
@@ -72,6 +75,17 @@ def _turned(foam: Foam, rng: np.random.Generator, move: str) -> Foam | None:
     except (TopologyError, ResolutionError, ValueError):
         return None
     return foam
+
+
+def candidates(network: CellNetwork, move: str) -> Bools:
+    """Whether a move of this kind may begin at each film, (n_films,)."""
+    fine = turnable(network)
+    if move == "glide":
+        fine &= charge_rise(network) <= 0
+    elif move == "wander":
+        four = t1_sites(network, np.arange(network.n_films)).bubbles
+        fine &= (network.charges[four] != 0).any(axis=1)
+    return fine
 
 
 def turnable(network: CellNetwork) -> Bools:

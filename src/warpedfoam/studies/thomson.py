@@ -122,7 +122,7 @@ def thomson_points(
 
     spacing = float(np.sqrt(surface.area / count))
     done = 0
-    energy, force = _state(surface, points, s, spacing)
+    energy, force = energy_and_force(surface, points, s, spacing)
     while done < limit and force > goal:
         # the logarithm, in units of the spacing: random starts have energies of any size
         found = minimize(
@@ -134,7 +134,7 @@ def thomson_points(
             options={"maxiter": min(ROUND, limit - done), "maxcor": 20, "ftol": 0.0, "gtol": 0.0},
         )
         moved = surface.project(found.x.reshape(-1, 3) * spacing)
-        lower, force_now = _state(surface, moved, s, spacing)
+        lower, force_now = energy_and_force(surface, moved, s, spacing)
         done += max(int(found.nit), 1)
         gained = energy - lower
         if gained < 0.0:
@@ -146,7 +146,8 @@ def thomson_points(
     return ThomsonPoints(frozen(points), energy, s, force, done, fixed)
 
 
-def _state(surface: Surface, points: Floats, s: float, spacing: float) -> tuple[float, float]:
+def energy_and_force(surface: Surface, points: Floats, s: float, spacing: float) -> tuple[float, float]:
+    """Riesz energy, and the largest tangential force in units of s E / (n ℓ)."""
     energy, slope = riesz_energy(points, s, surface.period)
     if not np.isfinite(energy):
         raise ConvergenceError("the points' energy is not finite: two points coincide; use another seed")
