@@ -60,9 +60,7 @@ class HeleShawCell:
     gap: float | GapField
     n_heights: int
 
-    def __init__(
-        self, surface: Surface, gap: float | Function | GapField, n_heights: int = 2
-    ) -> None:
+    def __init__(self, surface: Surface, gap: float | Function | GapField, n_heights: int = 2) -> None:
         if isinstance(surface, type) or not isinstance(surface, Surface):
             raise TypeError(
                 "surface must be a surface such as Sphere(1.0) or Torus(20.0, 4.0), "

@@ -54,7 +54,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     TypeError
         If an argument is of the wrong type.
     ValueError
-        If the surface has no formulas here, the gap varies, a bubble is no disk, or the name does not end in ``.fe``.
+        If the surface has no formulas here, the gap varies, a bubble is no disk, or the name does not end in
+        ``.fe``.
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
 
@@ -96,7 +97,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
 
 def _head(foam: Foam, formulas: Formulas) -> list[str]:
     lines = [
-        f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.mean_gap!r} apart, written by warpedfoam",
+        f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.mean_gap!r} apart, "
+        "written by warpedfoam",
         f"// pressures are relative to bubble_{foam.bubble_ids[-1]}, whose volume follows from the others'",
         "string",
         "space_dimension 3",

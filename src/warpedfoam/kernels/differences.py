@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,8 +30,8 @@ def differences(
     --------
     >>> x = np.array([[0.3, -0.2, 0.5]])
     >>> _, slope, bend = differences(lambda p: p[:, 0] ** 2 * p[:, 1], x, 0.01, second=True)
-    >>> slope.round(9).tolist(), bend[0, 0].round(8).tolist()
-    ([[-0.12, 0.09, 0.0]], [-0.4, 0.6, 0.0])
+    >>> slope[:, :2].round(9).tolist(), bend[0, 0, :2].round(8).tolist()
+    ([[-0.12, 0.09]], [-0.4, 0.6])
     """
     axes = np.eye(3)
     pairs = ((0, 1), (0, 2), (1, 2))
@@ -59,7 +60,10 @@ def best_step(function: Function, points: Floats, length: float) -> tuple[float,
     Of the steps `STEPS` times ``length`` the one whose gradient changes least when the step is lessened; the
     largest change is an estimate of the error, in units of f.
     """
-    slopes = [differences(function, points, share * length, second=False)[1] for share in STEPS]
-    change = [float(np.abs(b - a).max()) for a, b in zip(slopes[:-1], slopes[1:], strict=True)]
+    with np.errstate(all="ignore"):
+        slopes = [differences(function, points, share * length, second=False)[1] for share in STEPS]
+        change = np.array([np.abs(b - a).max() for a, b in pairwise(slopes)])
+    # a large step may lead to where the function is not defined
+    change[~np.isfinite(change)] = np.inf
     best = int(np.argmin(change))
-    return STEPS[best] * length, change[best]
+    return STEPS[best] * length, float(change[best])

@@ -1,14 +1,14 @@
 """Films whose height varies from node to node: area and swept volume with their derivatives.
 
-As in `warpedfoam.kernels.height_arcs`, but the film over node k ends at the height p_k d, with p = p(x) the gap
-over its mean d. With Gauss heights t and shares w of the mean gap, the area is
+As in `warpedfoam.kernels.height_arcs`, but the film over node k ends at the height p_k d, with p = p(x) the
+gap over its mean d. With Gauss heights t and shares w of the mean gap, the area is
 
     Σ_t Σ_k w_t ω_k p_k |s_tk|,    s_tk = (D x)_k + t p_k (D n)_k,
 
 and a change δp_k = ∇p · δx_k of the height joins that of the curve. Tangent parts of second derivatives of x
 are left out of Hessians as in `height_arcs`, since they meet no force at equilibrium; dW is not: a gap that
-varies a little leaves the motions of a round plate almost as soft as a parallel one does, and a Hessian off by
-d dW would take their minima for saddles.
+varies a little leaves the motions of a round plate almost as soft as parallel plates do, and a Hessian off
+by d dW would take their minima for saddles.
 """
 
 from __future__ import annotations

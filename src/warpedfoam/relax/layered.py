@@ -228,7 +228,7 @@ class LayeredSystem:
 
 
 def require_lines(foam: Foam) -> None:
-    """Refuse foams with marker vertices, whose lines could slide along their films, with rims or varying gaps.
+    """Refuse foams with marker vertices, whose lines could slide along their films, rims or varying gaps.
 
     Raises
     ------

@@ -155,8 +155,8 @@ def bubble_between_plates(
     Raises
     ------
     TypeError, ValueError
-        For bad input; if the gap varies; if ``position`` is not near the surface, or beyond its rim, or the bubble is too large
-        for its surface or reaches over its rim.
+        For bad input; if the gap varies; if ``position`` is not near the surface, or beyond its rim, or the
+        bubble is too large for its surface or reaches over its rim.
 
     Notes
     -----
@@ -205,7 +205,10 @@ class _Task:
                 f"volume must be less than the cell's, {between.volume:.6g}, got {amount:g}; "
                 "take a smaller bubble or a larger surface"
             )
-        radius, least = float(np.sqrt(amount / (np.pi * between.mean_gap))), LEAST_RADIUS * between.surface.size
+        radius, least = (
+            float(np.sqrt(amount / (np.pi * between.mean_gap))),
+            LEAST_RADIUS * between.surface.size,
+        )
         if radius < least:
             raise ValueError(
                 f"volume must be larger, got {amount:g}: on a surface of size {between.surface.size:.3g} the "

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ from warpedfoam.studies.rims import OverRim, disks_over_rim, require_on_surface
 from warpedfoam.theory import second_order_energy
 
 #: E of (volume, gap, k1, k2), the last two arrays of principal curvatures of the inner plate.
-Model = Callable[[float, float, Floats, Floats], Floats]
+Model = Callable[[float, Any, Floats, Floats], Floats]
 FILMS, THEORY = ("free", "ruled"), "theory"
 #: Step of the differences that give a model's force, in flat radii.
 DIFFERENCE = 0.05

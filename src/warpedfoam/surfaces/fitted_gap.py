@@ -88,7 +88,7 @@ def fitted_gap(surface: Surface, gap: Function) -> FittedGap | float:
     ------
     TypeError, ValueError
         If the values are not finite, above 0 and of shape (n,); if the plates fold somewhere; if the gap does
-        not repeat where the plate does, is too rough to be differentiated, or its derivatives are not its own.
+        not repeat where the plate does, is too rough to be differentiated, or has wrong derivatives.
     """
     if isinstance(gap, type):
         raise TypeError(f"gap must be a number or a function of points, got the class {gap.__name__}")
@@ -115,8 +115,8 @@ def fitted_gap(surface: Surface, gap: Function) -> FittedGap | float:
     if not (room > 1e-12).all():
         bad = int(np.argmin(room))
         raise ValueError(
-            f"gap folds the outer plate at {shown(rule.points[bad])}: it is {values[bad]:.4g} there, and must "
-            f"be less than {-1.0 / least[bad]:.4g}, the least radius of curvature on the side of the gap"
+            f"gap folds the outer plate at {shown(rule.points[bad])}: it is {values[bad]:.4g} there, and "
+            f"must be less than {-1.0 / least[bad]:.4g}, the least radius of curvature on the side of the gap"
         )
     return FittedGap(field, twin, frozen(rule.points), frozen(rule.weights), frozen(values))
 
@@ -133,30 +133,31 @@ def _require_period(gap: Function, nodes: Floats, period: Floats | None) -> None
         off = np.abs(gap_values(gap, some + way) - here)
         if off.max() > REPEATS * here.max():
             raise ValueError(
-                f"gap does not repeat after {shown(way)}, where the plate does: it differs by {off.max():.3g}; "
-                "take a function of that period, or a plate that ends (Graph, Cylinder)"
+                f"gap does not repeat after {shown(way)}, where the plate does: it differs by "
+                f"{off.max():.3g}; take a function of that period, or a plate that ends (Graph, Cylinder)"
             )
 
 
 def _with_derivatives(gap: Function, points: Floats, size: float, spread: float) -> GapField:
     """The gap with derivatives that were looked at."""
 
-    def values(at: Floats) -> Floats:
-        return gap_values(gap, at)
+    def raw(at: Floats) -> Floats:
+        return np.asarray(gap(at), dtype=np.float64).reshape(len(at))
 
-    step, error = best_step(values, points, size)
+    step, error = best_step(raw, points, size)
     if not isinstance(gap, GapField):
         # round-off in the values is not the function's fault
-        floor = 1e-14 * float(np.abs(values(points)).max()) / step
+        floor = 1e-14 * float(np.abs(gap_values(gap, points)).max()) / step
         if error > max(ROUGH * spread / size, 1e3 * floor):
             raise ValueError(
-                f"gap is too rough to be differentiated: its gradient changes by {error:.2g} with the step of "
-                "the differences; give a smoother function, or a gap with gradient and hessian (GapField)"
+                f"gap is too rough to be differentiated: its gradient changes by {error:.2g} with the step "
+                "of differences; give a function that is smooth on the plate and a little off it, or a gap "
+                "with gradient and hessian (GapField)"
             )
         return gap if isinstance(gap, FunctionGap) else FunctionGap(gap, step)
     if isinstance(gap, FunctionGap):
         return gap
-    _, slope, bend = differences(values, points, step, second=True)
+    _, slope, bend = differences(raw, points, step, second=True)
     given = as_floats(gap.gradient(points.copy()), "gap's gradient", (len(points), 3))
     bent = as_floats(gap.hessian(points.copy()), "gap's hessian", (len(points), 3, 3))
     assert bend is not None
@@ -172,6 +173,6 @@ def _require_equal(name: str, given: Floats, found: Floats, allowed: float, poin
     if not (fault <= allowed).all():
         bad = int(np.argmax(fault))
         raise ValueError(
-            f"gap's {name} is not that of its values: at {shown(points[bad])} it differs by {fault[bad]:.3g} from "
-            "central differences"
+            f"gap's {name} is not that of its values: at {shown(points[bad])} it differs by "
+            f"{fault[bad]:.3g} from central differences"
         )

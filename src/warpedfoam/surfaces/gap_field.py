@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_floats, as_number
+from warpedfoam.arrays import Bools, Floats, as_floats, as_number
 from warpedfoam.kernels.differences import differences
 from warpedfoam.kernels.gap_films import Thickness
 
@@ -116,9 +116,10 @@ class Profile:
             hessian = bend.reshape(*points.shape, 3)
         return Thickness(self.values(points), self.gradients(points), hessian)
 
-    def _sound(self, points: Floats) -> tuple[Floats, Floats]:
+    def _sound(self, points: Floats) -> tuple[Floats, Bools]:
+        """Points (n, 3), and which of them are no numbers and were replaced."""
         flat = points.reshape(-1, 3)
-        lost = ~np.isfinite(flat).all(axis=1)
+        lost: Bools = np.asarray(~np.isfinite(flat).all(axis=1))
         return np.where(lost[:, None], self.anchor, flat), lost
 
 

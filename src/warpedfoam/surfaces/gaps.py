@@ -139,7 +139,7 @@ class ShiftedSphereGap:
 
 @dataclass(frozen=True)
 class ShiftedTubeGap:
-    """Gap between a torus and one of tube radius r + d0 whose tube's centre is shifted within each half-plane.
+    """Gap between a torus and one of tube radius r + d0 whose tube is shifted within each half-plane.
 
     The outer tube's centre lies at (R + a, b) in the half-plane (distance from the axis, z), the inner one's
     at (R, 0). At the tube angle φ, with u = a cos φ + b sin φ, the outer tube is met at

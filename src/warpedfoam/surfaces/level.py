@@ -371,9 +371,7 @@ class LevelSurface(ABC):
             normals = self._unit(placed.points.reshape(-1, 3)).reshape(placed.points.shape)
         if layer.profile is not None:
             thickness = layer.profile.values(placed.points)
-            return varied_measure(
-                placed.rule, placed.points, normals, thickness, layer.heights, layer.shares
-            )
+            return varied_measure(placed.rule, placed.points, normals, thickness, layer.heights, layer.shares)
         return arcs.film_measure(placed.rule, placed.points, normals, layer.heights, layer.shares)
 
     def arc_terms(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from numpy.typing import ArrayLike
 
@@ -53,7 +53,7 @@ class LevelTwin(LevelSurface):
         return self.closed.integral(layer) if layer.profile is None else super().integral(layer)
 
     @property
-    def area(self) -> float:  # type: ignore[override]
+    def area(self) -> float:
         """That of the surface."""
         return self.closed.area
 
@@ -109,7 +109,7 @@ class LevelTwin(LevelSurface):
 
 
 @dataclass(frozen=True, repr=False)
-class LevelSphere(LevelTwin, Sphere):
+class LevelSphere(LevelTwin, Sphere):  # type: ignore[misc]
     """A sphere with the arcs of a level set."""
 
     @property
@@ -119,7 +119,7 @@ class LevelSphere(LevelTwin, Sphere):
 
 
 @dataclass(frozen=True, repr=False)
-class LevelTorus(LevelTwin, Torus):
+class LevelTorus(LevelTwin, Torus):  # type: ignore[misc]
     """A torus with the arcs of a level set."""
 
     @property
@@ -148,17 +148,22 @@ def level_twin(surface: Surface) -> LevelSurface:
     """
     if isinstance(surface, LevelSurface):
         return surface
-    if isinstance(surface, Sphere):
-        return LevelSphere(surface.radius)
-    if isinstance(surface, Torus):
-        return LevelTorus(surface.major_radius, surface.minor_radius)
+    if isinstance(surface, (Sphere, Torus)):
+        return _twin(surface)
     raise TypeError(
         f"gap varies, which a {type(surface).__name__} cannot carry: derive it from LevelSurface, or give a "
         "number"
     )
 
 
+@lru_cache(maxsize=4)
+def _twin(surface: Sphere | Torus) -> LevelTwin:
+    """One for all cells: its quadrature is kept."""
+    if isinstance(surface, Sphere):
+        return LevelSphere(surface.radius)
+    return LevelTorus(surface.major_radius, surface.minor_radius)
+
+
 def without_twin(surface: Surface) -> Surface:
     """The surface with its own arcs."""
     return surface.closed if isinstance(surface, LevelTwin) else surface
-

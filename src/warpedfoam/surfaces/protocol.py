@@ -65,7 +65,8 @@ class Layer:
         if self.profile is None:
             return c0 + c1 * mean + c2 * gauss
         p = self.profile.values(points)
-        return p * (c0 + p * (c1 * mean + p * (c2 * gauss)))
+        out: Floats = p * (c0 + p * (c1 * mean + p * (c2 * gauss)))
+        return out
 
     def density_slope(self, thickness: Thickness, shapes: Floats, slopes: Floats) -> Floats:
         """∇ of the integrand along the surface, (…, 3), from p, W (…, 3, 3) and ∂_a W (…, 3, 3, 3)."""
@@ -77,7 +78,8 @@ class Layer:
         by_p = c0 + p * (c1 * trace + p * (1.5 * c2 * (trace**2 - square)))
         bent: Floats = (0.5 * c1 * p**2)[..., None] * by_trace
         bent += (c2 * p**3)[..., None] * (trace[..., None] * by_trace - by_square)
-        return by_p[..., None] * thickness.gradient + bent
+        bent += by_p[..., None] * thickness.gradient
+        return bent
 
 
 @dataclass(frozen=True, eq=False)
