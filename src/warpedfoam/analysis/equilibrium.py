@@ -27,12 +27,16 @@ class EquilibriumReport:
         Largest |wall angle − π/2|; 0 without rims.
     geodesic_curvatures : (n_films,) array
         Length-weighted mean κ_g of each film, positive where its left bubble is convex.
+    film_curvatures : (n_films,) array
+        Length-weighted mean of κ_g + ∂_ν ln d, ν pointing out of the left bubble: κ_g where the gap does not
+        vary, and what pressures balance where it does.
     curvature_spread : (n_films,) array
-        Largest deviation of κ_g along the film from its mean.
+        Largest deviation of κ_g + ∂_ν ln d along the film from its mean.
     laplace_error : float or None
-        Largest |κ_g − (p_left − p_right)/γ|; None if the foam has no pressures.
+        Largest |κ_g + ∂_ν ln d − (p_left − p_right)/γ| of the means; None if the foam has no pressures.
     pressure_identity : (n_bubbles,) array or None
-        Σ_j (p_i − p_j) ℓ_ij / γ − [(π/3) q_i − ∫_i G dA − ∫ κ_g ds along its walls] of each bubble.
+        Σ_j (p_i − p_j) ℓ_ij / γ − [(π/3) q_i − ∫_i G dA − ∫ κ_g ds along its walls + ∫ ∂_ν ln d ds along its
+        films] of each bubble, ν pointing out of it.
     identity_error : float or None
         Largest |pressure_identity|.
     """
@@ -42,6 +46,7 @@ class EquilibriumReport:
     wall_angles: Floats
     wall_error: float
     geodesic_curvatures: Floats
+    film_curvatures: Floats
     curvature_spread: Floats
     laplace_error: float | None
     pressure_identity: Floats | None
@@ -53,7 +58,8 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
 
     At equilibrium films meet at 120° and walls at 90°, κ_g is constant along a film and equals
     (p_i − p_j)/γ, and by Gauss–Bonnet Σ_j (p_i − p_j) ℓ_ij/γ = (π/3) q_i − ∫_i G dA − ∫ κ_g ds along its
-    walls for every bubble, with the charge q_i = 6 − films − 2 walls. These hold
+    walls for every bubble, with the charge q_i = 6 − films − 2 walls. Where the gap varies, κ_g + ∂_ν ln d
+    takes the place of κ_g in Laplace's law, and the identity gains ∫ ∂_ν ln d ds. These hold
     as the gap goes to 0 (and the angles at any gap on a sphere); at a gap d the ruled film makes
     them off by the order of d times the curvature.
 
@@ -91,8 +97,13 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
     speed = np.linalg.norm(first, axis=2)
     kappa = np.einsum("fkx,fkx->fk", normal, np.cross(first, second)) / speed**3
     weight = rule.weights * speed
-    mean = (weight * kappa).sum(axis=1) / weight.sum(axis=1)
-    spread = np.abs(kappa - mean[:, None]).max(axis=1)
+    length = weight.sum(axis=1)
+    mean = (weight * kappa).sum(axis=1) / length
+    # ν |x'| = x' × n points to the right, out of the bubble on the left
+    slope = np.einsum("fkx,fkx->fk", foam.cell.log_gap_slopes(curve), np.cross(first, normal)) / speed
+    balanced = kappa + slope
+    pull_of = (weight * balanced).sum(axis=1) / length
+    spread = np.abs(balanced - pull_of[:, None]).max(axis=1)
 
     tangent = np.empty((2 * network.n_films, 3))
     tangent[0::2] = first[:, 0] / speed[:, 0, None]
@@ -114,8 +125,8 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
     laplace, identity, worst = None, None, None
     if foam.pressures is not None:
         drop = (foam.pressures[network.left] - foam.pressures[network.right]) / foam.tension
-        laplace = float(np.abs(mean - drop).max())
-        pull = drop * foam.film_lengths
+        laplace = float(np.abs(pull_of - drop).max())
+        pull = drop * foam.film_lengths - (weight * slope).sum(axis=1)
         count = network.n_bubbles
         total = np.bincount(network.left, pull, minlength=count)
         total -= np.bincount(network.right, pull, minlength=count)
@@ -128,6 +139,7 @@ def equilibrium_report(foam: Foam) -> EquilibriumReport:
         frozen(walls),
         float(np.abs(walls - 0.5 * np.pi).max(initial=0.0)),
         frozen(mean),
+        frozen(pull_of),
         frozen(spread),
         laplace,
         identity,

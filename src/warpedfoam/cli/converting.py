@@ -112,7 +112,7 @@ def info(file: str, *, frame: int) -> tuple[str, dict[str, Any]]:
         "surface": type(foam.cell.surface).__name__,
         "euler_characteristic": foam.cell.surface.euler_characteristic,
         "area": float(foam.cell.surface.area),
-        "gap": foam.cell.gap,
+        "gap": foam.cell.mean_gap,
         "tension": foam.tension,
         "seed": foam.seed,
         "order": foam.order,
@@ -132,7 +132,7 @@ def info(file: str, *, frame: int) -> tuple[str, dict[str, Any]]:
     lines = [
         f"foam      {_described(read, file)}",
         f"cell      {facts['surface']} of area {facts['area']:.6g} and Euler characteristic "
-        f"{facts['euler_characteristic']}, gap {foam.cell.gap:g}",
+        f"{facts['euler_characteristic']}, {'' if foam.cell.parallel else 'mean '}gap {foam.cell.mean_gap:g}",
         f"network   {network.n_films} films, {network.n_vertices} vertices"
         + (f", {facts['n_markers']} of them markers" if facts["n_markers"] else ""),
         f"sides     {told}   (charges add up to {facts['sum_of_charges']})",

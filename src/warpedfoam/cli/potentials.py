@@ -76,7 +76,7 @@ def map_potential(surface: Mapping[str, Any], given: Mapping[str, Any]) -> dict[
         (folder / PICTURE).unlink(missing_ok=True)
     facts = {
         "surface": {"kind": kind, **sizes},
-        "gap": cell.gap,
+        "gap": cell.mean_gap,
         "volume": volume,
         "flat_energy": found[0].flat_energy,
         "methods": {one.method: _told(one) for one in found},
@@ -103,7 +103,7 @@ def _along(surface: Surface, count: int) -> Floats:
 def _told(one: GeometricPotential) -> dict[str, Any]:
     known = np.isfinite(one.energies)
     # the film's own radii differ a little from the flat one
-    radius = 1.1 * float(np.sqrt(one.volume / (np.pi * one.cell.gap)))
+    radius = 1.1 * float(np.sqrt(one.volume / (np.pi * one.cell.mean_gap)))
     over = disks_over_rim(one.cell.surface, one.points, radius)
     size = np.linalg.norm(one.forces[known], axis=1)
     least, most = None, None

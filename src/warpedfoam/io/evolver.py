@@ -54,7 +54,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     TypeError
         If an argument is of the wrong type.
     ValueError
-        If the surface has no formulas here, a bubble is no disk, or the name does not end in ``.fe``.
+        If the surface has no formulas here, the gap varies, a bubble is no disk, or the name does not end in
+        ``.fe``.
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
 
@@ -80,6 +81,7 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     as_instance(foam, "foam", Foam)
     kind = as_choice(model, "model", MODELS)
     n = as_integer(segments, "segments", minimum=1, maximum=1000)
+    foam.cell.parallel_gap("write_fe")
     if (foam.network.bubble_euler != 1).any():
         bad = int(np.flatnonzero(foam.network.bubble_euler != 1)[0])
         raise ValueError(f"foam must consist of disks, but bubble {bad} is none: its volume is no one-form")
@@ -95,7 +97,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
 
 def _head(foam: Foam, formulas: Formulas) -> list[str]:
     lines = [
-        f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.gap!r} apart, written by warpedfoam",
+        f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.mean_gap!r} apart, "
+        "written by warpedfoam",
         f"// pressures are relative to bubble_{foam.bubble_ids[-1]}, whose volume follows from the others'",
         "string",
         "space_dimension 3",

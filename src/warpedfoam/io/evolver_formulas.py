@@ -76,7 +76,7 @@ def _sphere(foam: Foam, sphere: Sphere, ruled: bool) -> Formulas:
     The form is of degree 0, so a chord counts for the great circle above it. It is singular at −m only,
     opposite to the bubble.
     """
-    r, d = sphere.radius, foam.cell.gap
+    r, d = sphere.radius, foam.cell.mean_gap
     depth = ((r + d) ** 3 - r**3) / 3.0 if ruled else d * r**2
     film = d + d**2 / (2.0 * r) if ruled else d
     axes = foam.bubble_centres / r
@@ -113,7 +113,7 @@ def _torus(foam: Foam, torus: Torus, ruled: bool) -> Formulas:
     A ruled film is γ Σ_t w_t |(1 + t/r) T_∥ + (1 + t cos φ / ρ) T_θ|, with T_θ the part of the tangent
     round the axis and ρ the distance from it.
     """
-    ring, tube, d = torus.major_radius, torus.minor_radius, foam.cell.gap
+    ring, tube, d = torus.major_radius, torus.minor_radius, foam.cell.mean_gap
     if ruled:
         flat, bent = ring * (tube * d + 0.5 * d**2), ((tube + d) ** 3 - tube**3) / 3.0
     else:

@@ -81,7 +81,7 @@ def arrays_of(foam: Foam) -> Arrays:
     Raises
     ------
     TypeError
-        If ``foam`` is not a Foam, or its surface is not a dataclass of numbers and arrays.
+        If ``foam`` is not a Foam, or its surface or gap is not a dataclass of numbers and arrays.
     """
     as_instance(foam, "foam", Foam)
     network = foam.network
@@ -101,7 +101,7 @@ def arrays_of(foam: Foam) -> Arrays:
         "format": FORMAT,
         "version": VERSION,
         "surface": _described(foam.cell.surface, "surface", arrays),
-        "gap": foam.cell.gap,
+        "gap": _described_gap(foam.cell, arrays),
         "n_heights": foam.cell.n_heights,
         "tension": foam.tension,
         "seed": foam.seed,
@@ -120,7 +120,8 @@ def load(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
     ----------
     path : str or path
     surfaces : iterable of classes, optional
-        Surface classes of your own that the file may name, besides those of `warpedfoam.surfaces`.
+        Classes of your own, of surfaces or gaps, that the file may name besides those of
+        `warpedfoam.surfaces`.
 
     Returns
     -------
@@ -234,7 +235,8 @@ def foam_of(arrays: Arrays, known: Mapping[str, type]) -> Foam:
     for name in ("next", "origin", "bubble"):  # before anything is allocated by the largest index
         as_indices(arrays[name], name, (count,), below=count)
     surface = _restored(header["surface"], "surface", arrays, known)
-    cell = HeleShawCell(surface, header["gap"], header["n_heights"])
+    gap = _restored(header["gap"], "gap", arrays, known)
+    cell = HeleShawCell(surface, gap, header["n_heights"])
     network = CellNetwork(*(arrays[name] for name in ("next", "origin", "bubble", "bubble_euler")))
     return Foam(
         cell,
@@ -248,6 +250,18 @@ def foam_of(arrays: Arrays, known: Mapping[str, type]) -> Foam:
         seed=header["seed"],
         exterior=header.get("exterior"),
     )
+
+
+def _described_gap(cell: HeleShawCell, arrays: Arrays) -> float | dict[str, Any]:
+    """A number, or class and fields of a gap that varies."""
+    if cell.parallel:
+        return cell.mean_gap
+    if isinstance(cell.gap, _surfaces.FunctionGap):
+        raise TypeError(
+            "cannot save the gap: it is a plain function; LinearGap, ShiftedSphereGap, ShiftedTubeGap, "
+            "FormulaGap and dataclasses of your own can be saved"
+        )
+    return _described(cell.gap, "gap", arrays)
 
 
 def _described(value: object, place: str, arrays: Arrays) -> dict[str, Any]:
@@ -266,6 +280,8 @@ def _described(value: object, place: str, arrays: Arrays) -> dict[str, Any]:
             fields[field.name] = _described(item, where, arrays)
         elif item is None or isinstance(item, (bool, int, float, str)):
             fields[field.name] = item
+        elif isinstance(item, tuple) and all(isinstance(x, (int, float)) for x in item):
+            fields[field.name] = {"tuple": list(item)}
         else:
             raise TypeError(f"cannot save {where}: it is a {type(item).__name__}")
     return {"class": type(value).__name__, "fields": fields}
@@ -276,6 +292,8 @@ def _restored(entry: Any, place: str, arrays: Arrays, known: Mapping[str, type])
         return entry
     if "array" in entry:
         return arrays[entry["array"]]
+    if "tuple" in entry:
+        return tuple(entry["tuple"])
     kind = known.get(entry["class"])
     if kind is None or not dataclasses.is_dataclass(kind):
         raise FileFormatError(

@@ -139,14 +139,14 @@ def film_terms(
             own = np.einsum("kfx,jfx->fkj", across, lifted[1:-1, :, 4])
             rows[:, i, j, :, 4:] = own * rule.interior
         bend -= dots(force, normals)[..., None, None] * (shapes + t * np.matmul(shapes, shapes))
-    gradient = _collected(pull)
+    gradient = collected(pull)
     if not second:
         return value, gradient, None
     flat = rows.reshape(count, -1, 4 + inner)
     hessian = np.matmul(flat.transpose(0, 2, 1), flat).transpose(1, 2, 0)
     nodal = np.matmul(np.matmul(moves, bend), moves.transpose(0, 1, 3, 2))
     hessian = np.ascontiguousarray(hessian)
-    _add_nodal(hessian, nodal)
+    add_nodal(hessian, nodal)
     return value, gradient, hessian
 
 
@@ -165,7 +165,7 @@ def swept_terms(
     normal = np.tensordot(values, density[..., None] * normals, 1)
     slope = np.tensordot(slopes, arcs.points, 1)
     force = np.tensordot((omega[:, None] * values).T, np.cross(slope, normal), 1)
-    gradient = _collected(np.einsum("kfmx,kfx->kfm", moves, force))
+    gradient = collected(np.einsum("kfmx,kfx->kfm", moves, force))
     if not second:
         return gradient, None
     size = np.linalg.norm(normal, axis=2)
@@ -188,13 +188,13 @@ def swept_terms(
     return gradient, out
 
 
-def _collected(nodal: Floats) -> Floats:
+def collected(nodal: Floats) -> Floats:
     """Derivatives (p + 3, F) from those by (A, B, u_k) of each node (K, F, 5)."""
     ends = nodal[:, :, :4].sum(axis=0).T
     return np.concatenate([ends, nodal[1:-1, :, 4]])
 
 
-def _add_nodal(hessian: Floats, nodal: Floats) -> None:
+def add_nodal(hessian: Floats, nodal: Floats) -> None:
     """Add second derivatives node by node (K, F, 5, 5)."""
     hessian[:4, :4] += nodal[:, :, :4, :4].sum(axis=0).transpose(1, 2, 0)
     mixed = nodal[1:-1, :, :4, 4].transpose(2, 0, 1)

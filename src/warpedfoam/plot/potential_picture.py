@@ -99,7 +99,7 @@ def plot_potential(
     digits = int(np.clip(np.ceil(-np.log10(high - low)) + 3, 2, 13))
     bar.set_ticklabels([f"{v:.{digits}f}" for v in np.linspace(low, high, 5)])
     bar.set_label("E / E0")
-    heading = f"V = {one.volume:g}, d = {one.cell.gap:g}, {one.method}"
+    heading = f"V = {one.volume:g}, d = {one.cell.mean_gap:g}, {one.method}"
     axes.set_title(heading if title is None else title)
     return figure
 

@@ -94,7 +94,7 @@ class LayeredSystem:
         self.foam, self.layers = foam, layers
         self.surface = as_level(foam.cell.surface)
         self.rule = lobatto(foam.order)
-        self.across = Heights.across(foam.cell.gap, layers)
+        self.across = Heights.across(foam.cell.mean_gap, layers)
         network, n_curves, inner = foam.network, layers + 1, foam.order - 1
         self.n_vertex = 2 * n_curves * network.n_vertices
         self.n_shape = self.n_vertex + n_curves * inner * network.n_films
@@ -228,13 +228,14 @@ class LayeredSystem:
 
 
 def require_lines(foam: Foam) -> None:
-    """Refuse foams with marker vertices, whose lines could slide along their films, and with rims.
+    """Refuse foams with marker vertices, whose lines could slide along their films, rims or varying gaps.
 
     Raises
     ------
     ValueError
         If there are any.
     """
+    foam.cell.parallel_gap("relaxing with layers above 1")
     if foam.cell.surface.rim is not None:
         raise ValueError(
             "layers above 1 need a surface without rims: films that bulge against a wall are not available; "
@@ -269,7 +270,7 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
     foam = ruled.foam
     system = LayeredSystem(foam, layers)
     state = system.start()
-    unit, gap = foam.tension * foam.cell.gap, foam.cell.gap
+    unit, gap = foam.tension * foam.cell.mean_gap, foam.cell.mean_gap
     noise = ROUNDING * float(np.finfo(float).eps) * foam.cell.surface.size * foam.bubble_size / gap**2
     tolerance = max(tolerance, noise)
     least, stale, iterations, fatal = np.inf, 0, 0, ""

@@ -264,14 +264,14 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
 
     Parts of a foam that no films join move on their own, and turn where the surface is flat.
     """
-    modes = cell.surface.rigid_motions(state.points)
+    modes = cell.rigid_motions(state.points)
     network = state.network
     if (network.bubble_euler != 1).any() or len(network.markers):
         links = coo_array(
             (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
         )
         count, part = connected_components(links, directed=False)
-        if cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
+        if cell.parallel and cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
             turning = np.cross(cell.surface.normals(state.points), state.points)
             modes = np.concatenate([modes, turning[None]])
         own = part == np.arange(count)[:, None]

@@ -100,12 +100,12 @@ class BubbleBetweenPlates:
     @property
     def flat_energy(self) -> float:
         """E0 = 2 γ sqrt(π V d), that of a round bubble between parallel planes."""
-        return 2.0 * float(np.sqrt(np.pi * self.volume * self.cell.gap))
+        return 2.0 * float(np.sqrt(np.pi * self.volume * self.cell.mean_gap))
 
     @property
     def flat_radius(self) -> float:
         """sqrt(V / (π d))."""
-        return float(np.sqrt(self.volume / (np.pi * self.cell.gap)))
+        return float(np.sqrt(self.volume / (np.pi * self.cell.mean_gap)))
 
 
 def critical_gap(volume: float) -> float:
@@ -155,8 +155,8 @@ def bubble_between_plates(
     Raises
     ------
     TypeError, ValueError
-        For bad input; if ``position`` is not near the surface, or beyond its rim, or the bubble is too large
-        for its surface or reaches over its rim.
+        For bad input; if the gap varies; if ``position`` is not near the surface, or beyond its rim, or the
+        bubble is too large for its surface or reaches over its rim.
 
     Notes
     -----
@@ -196,6 +196,7 @@ class _Task:
     @classmethod
     def checked(cls, cell: object, volume: object, layers: object, hold: object, angles: object) -> _Task:
         between = as_instance(cell, "cell", HeleShawCell)
+        between.parallel_gap("a bubble between plates")
         amount = as_number(volume, "volume", positive=True)
         count = as_integer(layers, "layers", minimum=1, maximum=12)
         how = as_choice(hold, "hold", HOLDS)
@@ -204,7 +205,10 @@ class _Task:
                 f"volume must be less than the cell's, {between.volume:.6g}, got {amount:g}; "
                 "take a smaller bubble or a larger surface"
             )
-        radius, least = float(np.sqrt(amount / (np.pi * between.gap))), LEAST_RADIUS * between.surface.size
+        radius, least = (
+            float(np.sqrt(amount / (np.pi * between.mean_gap))),
+            LEAST_RADIUS * between.surface.size,
+        )
         if radius < least:
             raise ValueError(
                 f"volume must be larger, got {amount:g}: on a surface of size {between.surface.size:.3g} the "
@@ -221,7 +225,7 @@ class _Task:
     @property
     def radius(self) -> float:
         """Of the flat bubble."""
-        return float(np.sqrt(self.volume / (np.pi * self.cell.gap)))
+        return float(np.sqrt(self.volume / (np.pi * self.cell.mean_gap)))
 
     def too_large(self, point: Floats) -> ValueError:
         return ValueError(
@@ -233,7 +237,7 @@ class _Task:
 
 def _held(task: _Task, point: Floats) -> BubbleBetweenPlates:
     """The bubble held at a point of the surface, on the first grid that resolves it."""
-    surface, gap = task.cell.surface, task.cell.gap
+    surface, gap = task.cell.surface, task.cell.mean_gap
     chart = Chart.at(surface, point)
     angular = angle_coordinates(chart) if task.hold != "projection" else None
     coordinates = tangent_coordinates(chart) if angular is None else angular
@@ -328,7 +332,7 @@ def _report(
 
 
 def _message(task: _Task, met: bool, minimum: bool) -> str:
-    gap, limit = task.cell.gap, critical_gap(task.volume)
+    gap, limit = task.cell.mean_gap, critical_gap(task.volume)
     where = "beyond" if gap > limit else "close to"
     wide = f"the gap {gap:g} is {where} (pi V)^(1/3) = {limit:.4g}, where a round bubble loses its stability"
     if not met:
@@ -347,7 +351,7 @@ FREE_STEPS, REST, DIFFERENCE, FLAT = 60, 1e-9, 1e-2, 1e-9
 
 def _at_rest(task: _Task, point: Floats) -> BubbleBetweenPlates:
     """Follow the force of a held bubble to a place without force: Newton's method in two dimensions."""
-    surface, gap, h = task.cell.surface, task.cell.gap, DIFFERENCE * task.radius
+    surface, gap, h = task.cell.surface, task.cell.mean_gap, DIFFERENCE * task.radius
     bubble = _held(task, point)
     longest = max(0.5 * task.radius, 0.25 / max(1e-60, *map(abs, surface.curvature_range())))
     values = np.zeros(2)

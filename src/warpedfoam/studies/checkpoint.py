@@ -126,7 +126,8 @@ def fingerprint(foam: Foam) -> str:
         foam.vertex_points,
         foam.film_offsets,
         foam.target_volumes,
-        np.array([foam.cell.gap, foam.tension]),
+        np.array([foam.cell.mean_gap, foam.tension]),
+        *(() if foam.cell.parallel else (foam.cell.gaps(foam.vertex_points),)),
     ):
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(surface_mark(foam.cell.surface).encode("utf-8"))

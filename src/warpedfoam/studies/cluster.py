@@ -252,9 +252,8 @@ def _simple(centres: Floats, around: Floats | None, turn: float) -> Layout:
 
 def _area_for(cell: HeleShawCell, point: Floats, volume: float) -> float:
     """Area on the inner plate that holds a volume, with the curvatures at a point."""
-    k1, k2 = cell.surface.principal_curvatures(point[None])[0]
-    c0, c1, c2 = cell.layer.steiner
-    return float(volume / (c0 + 0.5 * c1 * (k1 + k2) + c2 * k1 * k2))
+    k1, k2 = cell.surface.principal_curvatures(point[None]).T
+    return float(volume / cell.layer.density(point[None], 0.5 * (k1 + k2), k1 * k2)[0])
 
 
 def _check_apart(surface: Surface, layouts: list[Layout], placed: list[Floats], units: list[float]) -> None:

@@ -91,8 +91,8 @@ def volume_moment(foam: Foam, about: Floats) -> tuple[Floats, float]:
     flat = surface.project(rays.reshape(-1, 3))
     normal = surface.normals(flat).reshape(rays.shape)
     curvature = surface.principal_curvatures(flat)
-    c0, c1, c2 = layer.steiner
-    weight = (c0 + 0.5 * c1 * curvature.sum(axis=1) + c2 * curvature.prod(axis=1)).reshape(rays.shape[:-1])
+    weight = layer.density(flat, 0.5 * curvature.sum(axis=1), curvature.prod(axis=1))
+    weight = weight.reshape(rays.shape[:-1])
     x = flat.reshape(rays.shape)
     outward = np.einsum("rs,sfkx->rfkx", across.derivative, x)
     forward = np.einsum("kl,rflx->rfkx", along.derivative, x)
@@ -139,8 +139,10 @@ def _gradients(foam: Foam, hold: Hold, volume: float, length: float) -> Floats:
     flat = curve.reshape(-1, 3)
     normal = surface.normals(flat).reshape(curve.shape)
     curvature = surface.principal_curvatures(flat)
-    c0, c1, c2 = foam.cell.layer.steiner
-    weight = (c0 + 0.5 * c1 * curvature.sum(axis=1) + c2 * curvature.prod(axis=1)).reshape(curve.shape[:-1])
+    layer = foam.cell.layer
+    weight = layer.density(flat, 0.5 * curvature.sum(axis=1), curvature.prod(axis=1)).reshape(
+        curve.shape[:-1]
+    )
     # steps out of the cluster times the length passed
     outward = np.cross(slope, normal) * sign[:, None, None]
     arm = curve - hold.point

@@ -69,7 +69,7 @@ def energy_over_honeycomb(foam: Foam) -> float:
     >>> round(energy_over_honeycomb(foam), 3) >= 1.0
     True
     """
-    gap = foam.cell.gap
+    gap = foam.cell.parallel_gap("energy over the honeycomb's")
     areas = foam.bubble_volumes[foam.network.bubble_euler == 1] / gap
     return foam.energy / (foam.tension * gap * honeycomb_bound(areas))
 

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ from warpedfoam.studies.rims import OverRim, disks_over_rim, require_on_surface
 from warpedfoam.theory import second_order_energy
 
 #: E of (volume, gap, k1, k2), the last two arrays of principal curvatures of the inner plate.
-Model = Callable[[float, float, Floats, Floats], Floats]
+Model = Callable[[float, Any, Floats, Floats], Floats]
 FILMS, THEORY = ("free", "ruled"), "theory"
 #: Step of the differences that give a model's force, in flat radii.
 DIFFERENCE = 0.05
@@ -80,7 +81,7 @@ class GeometricPotential:
     @property
     def flat_energy(self) -> float:
         """E0 = 2 γ sqrt(π V d)."""
-        return 2.0 * float(np.sqrt(np.pi * self.volume * self.cell.gap))
+        return 2.0 * float(np.sqrt(np.pi * self.volume * self.cell.mean_gap))
 
     @property
     def ratios(self) -> Floats:
@@ -116,7 +117,8 @@ def geometric_potential(
         "free": films in full three dimensions, `bubble_between_plates`, about 0.1 s a place. "ruled": films
         along the plate's normals. "theory": `warpedfoam.theory.second_order_energy`, a moment for any
         surface. Any other callable that gives E from (volume, gap, k1, k2), the last two the inner plate's
-        principal curvatures, (n,) each, will do as well.
+        principal curvatures, (n,) each, will do as well; where the gap varies, models get the
+        gap at each place, and films are refused.
     layers, hold : optional
         See `bubble_between_plates`; "free" is no choice here. A model has neither.
     nodes : int, optional
@@ -195,7 +197,7 @@ def _evaluate(
 
 
 def _flat_radius(cell: HeleShawCell, volume: float) -> float:
-    return float(np.sqrt(volume / (np.pi * cell.gap)))
+    return float(np.sqrt(volume / (np.pi * cell.mean_gap)))
 
 
 def _require_some(kept: Bools, volume: float) -> None:
@@ -242,7 +244,7 @@ def _of_model(cell: HeleShawCell, volume: float, places: Floats, model: Model) -
 
     def energies(points: Floats) -> Floats:
         k1, k2 = surface.principal_curvatures(points).T
-        values = np.asarray(model(volume, cell.gap, k1, k2))
+        values = np.asarray(model(volume, cell.mean_gap if cell.parallel else cell.gaps(points), k1, k2))
         return as_floats(values, "the values of method", (len(points),))
 
     h = DIFFERENCE * _flat_radius(cell, volume)
@@ -324,7 +326,7 @@ def drift_path(
     here, size = at(place), first
     trail, travelled = [here], [0.0]
     while len(trail) <= count and size > first / 1024.0:
-        if np.linalg.norm(here.forces) <= 1e-12 * between.gap:
+        if np.linalg.norm(here.forces) <= 1e-12 * between.mean_gap:
             break
         try:
             middle = at(moved(here.points, here.forces, 0.5 * size))

@@ -5,6 +5,9 @@ from warpedfoam.surfaces.cylinder import Cylinder
 from warpedfoam.surfaces.ellipsoid import Ellipsoid
 from warpedfoam.surfaces.files import read_mesh
 from warpedfoam.surfaces.flat_torus import FlatTorus
+from warpedfoam.surfaces.formula_gap import FormulaGap
+from warpedfoam.surfaces.gap_field import FunctionGap, GapField
+from warpedfoam.surfaces.gaps import LinearGap, ShiftedSphereGap, ShiftedTubeGap
 from warpedfoam.surfaces.graph import Graph
 from warpedfoam.surfaces.health import MeshFinding, MeshReport, mesh_report, repaired
 from warpedfoam.surfaces.implicit import Implicit
@@ -25,10 +28,14 @@ __all__ = [
     "Cylinder",
     "Ellipsoid",
     "FlatTorus",
+    "FormulaGap",
+    "FunctionGap",
+    "GapField",
     "Graph",
     "Implicit",
     "Layer",
     "LevelSurface",
+    "LinearGap",
     "MeshFinding",
     "MeshReport",
     "MeshSurface",
@@ -36,6 +43,8 @@ __all__ = [
     "Revolution",
     "Rim",
     "SchwarzP",
+    "ShiftedSphereGap",
+    "ShiftedTubeGap",
     "Sphere",
     "Surface",
     "Torus",

@@ -83,6 +83,8 @@ class Catenoid(LevelSurface):
     def integral(self, layer: Layer) -> float:
         """∫ dA = πa² (h/a + sinh(h/a)), ∫ H dA = 0, ∫ G dA = −4π tanh(h/2a)."""
         a, long = self.neck_radius, self.height / self.neck_radius
+        if layer.profile is not None:
+            return super().integral(layer)
         c0, _, c2 = layer.steiner
         area = np.pi * a**2 * (long + np.sinh(long))
         return float(c0 * area - c2 * 4.0 * np.pi * np.tanh(0.5 * long))

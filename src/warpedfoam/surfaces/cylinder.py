@@ -76,6 +76,8 @@ class Cylinder(LevelSurface):
 
     def integral(self, layer: Layer) -> float:
         """(c0 + c1/2r) 2πr · height."""
+        if layer.profile is not None:
+            return super().integral(layer)
         c0, c1, _ = layer.steiner
         return (c0 + 0.5 * c1 / self.radius) * 2.0 * np.pi * self.radius * self.height
 

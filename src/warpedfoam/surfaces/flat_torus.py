@@ -67,6 +67,8 @@ class FlatTorus(LevelSurface):
 
     def integral(self, layer: Layer) -> float:
         """c0 · width · height."""
+        if layer.profile is not None:
+            return super().integral(layer)
         return layer.steiner[0] * self.width * self.height
 
     def curvature_range(self) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -106,6 +107,10 @@ class Graph(LevelSurface):
     @property
     def size(self) -> float:
         """Radius of a ball round the origin that holds one unit."""
+        return self._extent
+
+    @cached_property
+    def _extent(self) -> float:
         z = self._height(self._flat(400)[0])
         return float(np.hypot(0.5 * self._sheet.size, 1.1 * np.abs(z).max()))
 

@@ -13,6 +13,7 @@ from warpedfoam.arrays import Bools, Floats, Ints, as_generator, as_integer, as_
 from warpedfoam.errors import MeshError
 from warpedfoam.kernels import height_arcs as arcs
 from warpedfoam.kernels.fans import fan_integrals
+from warpedfoam.kernels.gap_films import swept_change, varied_measure, varied_terms
 from warpedfoam.kernels.jets import frames_of
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.nodal import bump_offsets
@@ -20,7 +21,7 @@ from warpedfoam.kernels.periodic import loop_shifts, nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.kernels.thinning import accepted
 from warpedfoam.surfaces.mesh import TriangleMesh
-from warpedfoam.surfaces.patches import PatchedMesh
+from warpedfoam.surfaces.patches import PatchedMesh, Quadrature
 from warpedfoam.surfaces.places import Places
 from warpedfoam.surfaces.protocol import ArcTerms, Layer
 from warpedfoam.surfaces.rim import Rim, with_walls
@@ -29,6 +30,8 @@ from warpedfoam.surfaces.rim import Rim, with_walls
 LINE_STEPS, NEAREST_STEPS = 12, 200
 #: Rounds of the even lattice.
 LATTICE_ROUNDS = 40
+#: Step of the differences of shape operators, in sizes.
+SLOPE_STEP = 1e-4
 
 #: f, its gradient and, if asked for, second derivatives, at new places of some points of `LevelSurface.near`.
 Look = Callable[[Floats, "Ints | slice", bool], tuple[Floats, Floats, Floats | None]]
@@ -187,6 +190,15 @@ class LevelSurface(ABC):
         assert shape is not None
         return normal, shape
 
+    def _shape_slopes(self, points: Floats, normals: Floats) -> Floats:
+        """∂_a W along the surface at points (…, 3) of it, (…, 3, 3, 3), by central differences."""
+        frames, h = frames_of(normals.reshape(-1, 3)), SLOPE_STEP * self.size
+        out = np.zeros((len(frames), 3, 3, 3))
+        for e in (frames[:, 0], frames[:, 1]):
+            ahead, behind = (self._shape(points.reshape(-1, 3) + s * h * e)[1] for s in (1.0, -1.0))
+            out += e[:, :, None, None] * ((ahead - behind) / (2.0 * h))[:, None]
+        return out.reshape(*points.shape, 3, 3)
+
     def _settled(self, points: Floats, axes: Floats) -> tuple[Floats, Floats, Floats]:
         """Where lines from near points meet the surface, normals and shape operators there."""
         found, normal, shape = self._landed(points, axes, second=True)
@@ -247,6 +259,10 @@ class LevelSurface(ABC):
         fine = self.triangulate(self.integral_nodes)
         return PatchedMesh(fine, self._settled, self._unit, self.rim, self.beyond)
 
+    def quadrature(self) -> Quadrature:
+        """A rule for integrals over the whole surface, on a fine mesh."""
+        return self._patches.quadrature()
+
     @cached_property
     def _moments(self) -> tuple[float, float, float, float, float]:
         """∫ dA, ∫ H dA, ∫ G dA, and the range of the principal curvatures."""
@@ -264,7 +280,10 @@ class LevelSurface(ABC):
 
     def integral(self, layer: Layer) -> float:
         """∫ (c0 + c1 H + c2 G) dA by Gauss quadrature over a fine mesh."""
-        return float(np.dot(layer.steiner, self._moments[:3]))
+        if layer.profile is None:
+            return float(np.dot(layer.steiner, self._moments[:3]))
+        rule = self.quadrature()
+        return float(rule.weights @ layer.density(rule.points, *_mean_gauss(rule.shapes)))
 
     def curvature_range(self) -> tuple[float, float]:
         """Least and greatest principal curvature on a fine mesh."""
@@ -290,12 +309,16 @@ class LevelSurface(ABC):
 
     def vertex_frames(self, points: Floats) -> Floats:
         """Two tangent unit vectors e1, e2 with e1 × e2 = n, by the branchless rule of Duff et al. (2017)."""
-        return frames_of(self._unit(points))[:, :2]
+        return self.frames_at(points, self._unit(points))
+
+    def frames_at(self, points: Floats, normals: Floats) -> Floats:  # noqa: ARG002
+        """`vertex_frames` where the normals are known."""
+        return frames_of(normals)[:, :2]
 
     def retract(self, points: Floats, steps: Floats) -> Floats:
         """Move in the tangent plane, then along the old normal to the surface."""
         normal = self._unit(points)
-        frames = frames_of(normal)[:, :2]
+        frames = self.frames_at(points, normal)
         return self.foot(points + np.einsum("ni,nix->nx", steps, frames), normal)
 
     def rigid_motions(self, points: Floats) -> Floats:
@@ -346,6 +369,9 @@ class LevelSurface(ABC):
         normals = np.zeros_like(placed.points)
         if layer.heights.any():
             normals = self._unit(placed.points.reshape(-1, 3)).reshape(placed.points.shape)
+        if layer.profile is not None:
+            thickness = layer.profile.values(placed.points)
+            return varied_measure(placed.rule, placed.points, normals, thickness, layer.heights, layer.shares)
         return arcs.film_measure(placed.rule, placed.points, normals, layer.heights, layer.shares)
 
     def arc_terms(
@@ -363,15 +389,24 @@ class LevelSurface(ABC):
         shape = placed.points.shape
         normal, bend = self._shape(placed.points.reshape(-1, 3))
         normals, shapes = normal.reshape(shape), bend.reshape(*shape, 3)
-        frames = (frames_of(normals[0])[:, :2], frames_of(normals[-1])[:, :2])
+        frames = (self.frames_at(tail, normals[0]), self.frames_at(head, normals[-1]))
         moves = arcs.jacobians(placed, normals, shapes, frames)
         second = jump is not None
-        value, gradient, hessian = arcs.film_terms(
-            placed, normals, shapes, moves, layer.heights, layer.shares, second=second
-        )
+        across = (layer.heights, layer.shares)
         mean, gauss = _mean_gauss(shapes)
-        c0, c1, c2 = layer.steiner
-        volume, bending = arcs.swept_terms(placed, normals, c0 + c1 * mean + c2 * gauss, moves, second=second)
+        if layer.profile is None:
+            value, gradient, hessian = arcs.film_terms(placed, normals, shapes, moves, *across, second=second)
+        else:
+            thickness = layer.profile.thickness(placed.points, second=second)
+            slopes = self._shape_slopes(placed.points, normals) if second else None
+            value, gradient, hessian = varied_terms(
+                placed, normals, shapes, moves, thickness, *across, slopes
+            )
+        density = layer.density(placed.points, mean, gauss)
+        volume, bending = arcs.swept_terms(placed, normals, density, moves, second=second)
+        if bending is not None and layer.profile is not None and slopes is not None:
+            slope = layer.density_slope(thickness, shapes, slopes)
+            bending += swept_change(placed, normals, slope, moves)
         if hessian is not None and bending is not None and jump is not None:
             hessian *= tension
             hessian -= jump * bending
@@ -403,11 +438,10 @@ class LevelSurface(ABC):
         bent = c1 != 0.0 or c2 != 0.0
 
         def land(points: Floats, axes: Floats) -> tuple[Floats, Floats]:
-            _, normal, shape = self._landed(points, axes, second=bent)
+            at, normal, shape = self._landed(points, axes, second=bent)
             if shape is None:
                 return normal, np.full(len(points), c0)
-            mean, gauss = _mean_gauss(shape)
-            return normal, c0 + c1 * mean + c2 * gauss
+            return normal, layer.density(at, *_mean_gauss(shape))
 
         back = (loops.halves & 1).astype(bool)[:, None]
         first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Floats, Ints, frozen
+from warpedfoam.kernels.gap_films import Thickness
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.quadrature import gauss
+from warpedfoam.surfaces.gap_field import Profile
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.rim import Rim
 
@@ -30,12 +32,16 @@ class Layer:
     Along an arc: Σ_t shares_t · length of the arc lifted to height t. Inside a loop:
     ∫ (c0 + c1 H + c2 G) dA with ``steiner`` = (c0, c1, c2), by ``rays`` Gauss points from the centre to
     the rim on surfaces without closed forms (2 for a draft).
+
+    With a ``profile`` p(x), which `LevelSurface` alone can take, heights and shares are those of the mean gap
+    and stretch by p, and the integrand is p c0 + p² c1 H + p³ c2 G.
     """
 
     heights: Floats
     shares: Floats
     steiner: tuple[float, float, float]
     rays: int = 6
+    profile: Profile | None = None
 
     @classmethod
     def surface(cls) -> Layer:
@@ -52,6 +58,28 @@ class Layer:
         """Ruled film areas by Gauss quadrature through the gap d, and volumes d + H d² + G d³/3."""
         heights, shares = gauss(n_heights)
         return cls(frozen(gap * heights), frozen(gap * shares), (gap, gap**2, gap**3 / 3.0))
+
+    def density(self, points: Floats, mean: Floats, gauss: Floats) -> Floats:
+        """The integrand c0 + c1 H + c2 G, at points (…, 3) of the surface with curvatures (…)."""
+        c0, c1, c2 = self.steiner
+        if self.profile is None:
+            return c0 + c1 * mean + c2 * gauss
+        p = self.profile.values(points)
+        out: Floats = p * (c0 + p * (c1 * mean + p * (c2 * gauss)))
+        return out
+
+    def density_slope(self, thickness: Thickness, shapes: Floats, slopes: Floats) -> Floats:
+        """∇ of the integrand along the surface, (…, 3), from p, W (…, 3, 3) and ∂_a W (…, 3, 3, 3)."""
+        c0, c1, c2 = self.steiner
+        p, trace = thickness.value, np.einsum("...xx->...", shapes)
+        by_trace = np.einsum("...axx->...a", slopes)
+        square = np.einsum("...xy,...xy->...", shapes, shapes)
+        by_square = np.einsum("...axy,...xy->...a", slopes, shapes)
+        by_p = c0 + p * (c1 * trace + p * (1.5 * c2 * (trace**2 - square)))
+        bent: Floats = (0.5 * c1 * p**2)[..., None] * by_trace
+        bent += (c2 * p**3)[..., None] * (trace[..., None] * by_trace - by_square)
+        bent += by_p[..., None] * thickness.gradient
+        return bent
 
 
 @dataclass(frozen=True, eq=False)

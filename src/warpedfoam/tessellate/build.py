@@ -294,8 +294,7 @@ def _target_volumes(
 def _node_volumes(cell: HeleShawCell, mesh: TriangleMesh) -> Floats:
     """Volume between the plates that each mesh node stands for."""
     k1, k2 = cell.surface.principal_curvatures(mesh.nodes).T
-    c0, c1, c2 = cell.layer.steiner
-    out: Floats = mesh.node_areas * (c0 + 0.5 * c1 * (k1 + k2) + c2 * k1 * k2)
+    out: Floats = mesh.node_areas * cell.layer.density(mesh.nodes, 0.5 * (k1 + k2), k1 * k2)
     return out
 
 

@@ -221,7 +221,7 @@ def _frame_facts(
         "label": label,
         "bubbles": foam.n_bubbles,
         "energy": foam.energy,
-        "gap": foam.cell.gap,
+        "gap": foam.cell.mean_gap,
         "size": foam.bubble_size,
         "pull": min(_PULL * foam.bubble_size, _MOST_PULL * side),
         "sink": max(float(mesh.sunk.max()) for mesh in meshes),
