@@ -82,6 +82,13 @@ def test_outlines_fill_the_map_once(name: str, way: str) -> None:
     # chords of the edge differ by where films cut it, on maps with a curved edge
     allowed = 1e-12 if chart.axes() is not None else 1e-6
     assert areas.sum() == pytest.approx(window_area(chart), rel=allowed)
+    # no film leaves its window, not even for a step
+    at = chart.strands(foam.film_curves(9)).at
+    if way == "stereographic":
+        assert np.linalg.norm(at, axis=1).max() < 1.0 + 1e-12
+    else:
+        assert (at > chart.low - 1e-9).all()
+        assert (at < chart.high + 1e-9).all()
 
 
 @pytest.mark.parametrize(("name", "way"), CASES)

@@ -131,7 +131,7 @@ def test_title_and_colour_bar() -> None:
     foam = with_pressures(torus_foam())
     figure = plot_foam(foam, "area")
     assert figure.axes[0].get_title() == f"96 bubbles on a torus · energy {foam.energy:.6g}"
-    assert figure.axes[1].get_ylabel() == "area of the bubble"
+    assert figure.axes[1].get_ylabel() == "area of the bubble (length²)"
     low, high = figure.axes[1].get_ylim()
     assert (low, high) == pytest.approx((foam.bubble_areas.min(), foam.bubble_areas.max()))
     assert plot_foam(bubble_on_torus()).axes[0].get_title().startswith("1 bubble on a torus")

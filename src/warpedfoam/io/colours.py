@@ -106,13 +106,16 @@ def _named(foam: Foam, name: str) -> tuple[Floats, str]:
     if name == "pressure":
         if foam.pressures is None:
             raise ValueError("color_by='pressure' needs pressures: relax the foam first (warpedfoam.relax)")
-        return foam.pressures, "pressure"
+        return foam.pressures, "pressure (γ / length)"
     if name == "area":
-        return foam.bubble_areas, "area of the bubble"
+        return foam.bubble_areas, "area of the bubble (length²)"
     if name == "volume":
-        return foam.bubble_volumes, "volume of the bubble"
+        return foam.bubble_volumes, "volume of the bubble (length³)"
     if name == "curvature":
-        return foam.bubble_curvatures / foam.bubble_areas, "Gaussian curvature, mean of the bubble"
+        return (
+            foam.bubble_curvatures / foam.bubble_areas,
+            "Gaussian curvature, mean of the bubble (1 / length²)",
+        )
     if name == "sides":
         return foam.network.sides.astype(np.float64), "sides n"
     return foam.network.charges.astype(np.float64), "charge q"

@@ -10,6 +10,7 @@ from warpedfoam.arrays import Floats, as_instance, as_number
 from warpedfoam.io.colours import RAMP
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.plot.projection import View, back_to_front, facing, shades
+from warpedfoam.plot.style import Style
 from warpedfoam.studies import GeometricPotential
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def plot_potential(
     *,
     view: tuple[float, float] = (35.0, -60.0),
     size: tuple[float, float] = (8.0, 5.6),
+    width: float | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw E/E0 as colours on the surface; points or a path as coloured dots on a pale surface.
@@ -38,6 +40,8 @@ def plot_potential(
         Elevation and azimuth in degrees.
     size : (float, float), optional
         Width and height in inches.
+    width : float, optional
+        Instead, the width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one column.
     title : str, optional
 
     Returns
@@ -52,10 +56,8 @@ def plot_potential(
     ValueError
         If no energy in it is a number.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, Normalize
-    from matplotlib.figure import Figure
 
     one = as_instance(potential, "potential", GeometricPotential)
     values = one.ratios
@@ -68,8 +70,9 @@ def plot_potential(
         low, high = low - 0.5e-6, high + 0.5e-6
     ramp, norm = LinearSegmentedColormap.from_list("ramp", RAMP), Normalize(low, high)
 
-    figure = Figure(figsize=(as_number(size[0], "size"), as_number(size[1], "size")), layout="constrained")
-    FigureCanvasAgg(figure)
+    wide, tall = (as_number(number, "size", positive=True) for number in size)
+    style = Style.of(25.4 * wide if width is None else width)
+    figure = style.figure(style.width * tall / wide)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.set_axis_off()
@@ -93,14 +96,15 @@ def plot_potential(
         axes.scatter(
             x[seen], y[seen], c=values[seen], cmap=ramp, norm=norm, s=26, edgecolors="0.2", lw=0.4, zorder=3
         )
-    bar = figure.colorbar(ScalarMappable(norm, ramp), ax=axes, shrink=0.75)
+    bar = figure.colorbar(ScalarMappable(norm, ramp), ax=axes, shrink=0.75, pad=0.02)
+    bar.ax.tick_params(labelsize=style.small)
     # differences of E/E0 lie far behind the point: the ticks carry them, not an offset over the bar
     bar.set_ticks(np.linspace(low, high, 5).tolist())
     digits = int(np.clip(np.ceil(-np.log10(high - low)) + 3, 2, 13))
     bar.set_ticklabels([f"{v:.{digits}f}" for v in np.linspace(low, high, 5)])
-    bar.set_label("E / E0")
+    bar.set_label("E / E0", fontsize=style.text)
     heading = f"V = {one.volume:g}, d = {one.cell.mean_gap:g}, {one.method}"
-    axes.set_title(heading if title is None else title)
+    axes.set_title(heading if title is None else title, fontsize=style.title)
     return figure
 
 

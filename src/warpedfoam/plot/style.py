@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Widths in millimetres: one column of a journal, both, and what figures are without a width.
 COLUMN, PAGE, USUAL = 86.0, 180.0, 228.6
+#: Width of one of several panels.
+PANEL = 117.0
 #: Narrower ones (mm) have their panels and legends one below the other.
 NARROW = 130.0
 #: Points of letters on one column and on the usual width; none are smaller than the least.
@@ -76,9 +78,10 @@ class Style:
         FigureCanvasAgg(figure)
         return figure
 
-    def panels(self, count: int, height: float) -> tuple[Figure, list[Axes]]:
-        """Panels beside each other, or one below the other on a narrow figure; ``height`` inches each."""
-        figure = self.figure(height * (count if self.narrow else 1))
+    def panels(self, count: int) -> tuple[Figure, list[Axes]]:
+        """Panels beside each other, or flatter ones below each other on a narrow figure."""
+        wide = self.width / (1 if self.narrow else count)
+        figure = self.figure(wide * 0.62 * count if self.narrow else wide * 0.87)
         rows, columns = (count, 1) if self.narrow else (1, count)
         return figure, [figure.add_subplot(rows, columns, k + 1) for k in range(count)]
 
