@@ -412,3 +412,70 @@ def test_bad_input(arguments: tuple, error: type[Exception], match: str) -> None
     foam, options = arguments
     with pytest.raises(error, match=match):
         wf.defects(lone_bubble() if foam is None else foam, **options)
+
+
+# ------------------------------------------------------------------------------------- rims
+
+
+def strip(lost: int | None = None) -> wf.Foam:
+    """A honeycomb on a cylinder, rows of bubbles along both walls; one bubble may be missing."""
+    around, rows = 14, 9
+    row, place = np.divmod(np.arange(around * rows), around)
+    step = 1.0
+    radius = around * step / (2.0 * np.pi)
+    surface = wf.Cylinder(radius, rows * step * np.sqrt(0.75))
+    angle = (place + 0.5 * (row % 2)) * step / radius
+    z = (row + 0.5) * step * np.sqrt(0.75)
+    bottom, top = sorted(surface.mesh.nodes[:, 2][[0, -1]].tolist())
+    z = z * (top - bottom) / (rows * step * np.sqrt(0.75)) + bottom
+    seeds = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    if lost is not None:
+        seeds = np.delete(seeds, lost, axis=0)
+    return wf.voronoi_foam(wf.HeleShawCell(surface, gap=0.01), seeds=seeds, order=3)
+
+
+def test_a_honeycomb_that_ends_at_walls_has_no_defects() -> None:
+    """q = 6 − films − 2 a wall: a bubble with four films and a wall belongs to the crystal."""
+    foam = strip()
+    assert foam.network.wall_counts.sum() == 28
+    assert not foam.network.charges.any()
+    assert wf.defects(foam).clusters.kind.size == 0
+
+
+@pytest.mark.parametrize("lost", [3, 14 * 8 + 6])
+def test_a_vacancy_at_a_wall_is_one_of_the_rim(lost: int) -> None:
+    """A bubble missing from the row at the wall: charges that touch the wall and add up to 0."""
+    found = wf.defects(strip(lost))
+    assert found.total_charge == 0
+    assert found.clusters.kind.tolist() == ["rim"]
+    assert found.summary["rim_charges"] >= 1
+    # no walk closes at a wall, so there is no Burgers vector and nothing to count in it
+    assert np.isnan(found.clusters.burgers).all() or not found.clusters.burgers.any()
+    assert found.disclinations.rim.any()
+    assert found.clusters.charge.tolist() == [0]
+
+
+def test_the_same_vacancy_inside_is_not() -> None:
+    foam = strip(14 * 4 + 6)
+    found = wf.defects(foam)
+    assert found.clusters.kind.tolist() == ["vacancy"]
+    assert found.clusters.missing.tolist() == [1]
+    assert not found.disclinations.rim.any()
+    # at the wall two rows away it stays one: only touching counts
+    near = wf.defects(strip(14 * 2 + 6))
+    assert near.clusters.kind.tolist() == ["vacancy"]
+
+
+def test_a_dislocation_that_reaches_a_wall() -> None:
+    """A T1 at the wall leaves charges there; they turn with the foam and keep their kind under new names."""
+    foam = strip()
+    network = foam.network
+    on_wall = network.wall_counts > 0
+    films = np.flatnonzero(on_wall[network.left] ^ on_wall[network.right])
+    turned_one = wf.t1(foam, int(films[5]))
+    found = wf.defects(turned_one)
+    assert found.total_charge == 0
+    assert found.clusters.kind.tolist() == ["rim"]
+    names, _ = relabelled(turned_one, 3)
+    again = wf.defects(names)
+    assert again.summary == found.summary

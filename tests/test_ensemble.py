@@ -284,6 +284,43 @@ def test_another_study_is_kept_out(tmp_path: Path) -> None:
         wf.run_ensemble(study(seed=3), tmp_path, workers=0)
 
 
+def test_an_edited_function_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of a user's function that was edited meanwhile are computed again: no table of two halves."""
+    name = user_functions(tmp_path, "def answer(foam):\n    return 1\n", monkeypatch)
+    made = {"observables": (f"{name}:answer",), "grid": {}, "repeats": 2}
+    first = wf.run_ensemble(study(**made), tmp_path / "out", workers=0)
+    assert first.columns["answer"] == [1, 1]
+    (tmp_path / f"{name}.py").write_text("def answer(foam):\n    return 22\n")
+    monkeypatch.delitem(sys.modules, name)
+    again = wf.run_ensemble(study(**made), tmp_path / "out", workers=0)
+    assert again.columns["answer"] == [22, 22]
+    assert again.columns["seed"] == first.columns["seed"]
+    assert wf.run_ensemble(study(**made), tmp_path / "out", workers=0).record["computed_now"] == 0
+
+
+@posix
+def test_a_full_disk_is_told_with_the_file_and_costs_nothing_else(
+    plain: wf.Ensemble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync, calls = os.fsync, []
+
+    def full(descriptor: int) -> None:
+        calls.append(descriptor)
+        if len(calls) > 8:
+            raise OSError(28, "No space left on device")
+        sync(descriptor)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space left on device") as fault:
+            wf.run_ensemble(study(), tmp_path / "out", workers=0)
+    assert str(tmp_path / "out") in str(fault.value.filename)
+    assert not list((tmp_path / "out").rglob("*.part"))
+    done = wf.run_ensemble(study(), tmp_path / "out", workers=0)
+    assert 0 < done.record["computed_now"] < 4
+    assert files(tmp_path / "out") == files(plain.folder)
+
+
 def test_a_damaged_line_is_named(tmp_path: Path) -> None:
     wf.run_ensemble(study(repeats=1, grid={}), tmp_path, workers=0)
     journal = tmp_path / "runs.jsonl"
@@ -432,7 +469,14 @@ def test_the_command_says_how_it_went(tmp_path: Path) -> None:
     options = ("--workers", "0", "-q", "--set", "relax.max_iterations=1")
     hasty = call(tmp_path / "study.toml", "-o", tmp_path / "two", *options)
     assert hasty.exit_code == 1
-    assert hasty.output == "warpedfoam: 2 of 2 runs not_converged; see the table\n"
+    assert hasty.output.startswith(
+        "warpedfoam: 2 of 2 runs not_converged; see the table; the first says: not converged after 1 of 1"
+    )
+    grown = call(tmp_path / "study.toml", "-o", tmp_path / "out", "--workers", "0", "--json",
+                 "--set", "grid.foam.n_bubbles=[14, 16]")  # fmt: skip
+    assert grown.exit_code == 0, grown.output
+    facts = json.loads(grown.stdout)
+    assert (facts["runs"], facts["computed_now"], facts["first_reason"]) == (4, 2, None)
 
 
 @pytest.mark.parametrize(

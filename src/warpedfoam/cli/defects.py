@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpedfoam.analysis import DefectReport, bond_order, defects, foam_statistics
+from warpedfoam.cli.folders import output_folder
 from warpedfoam.foam import Foam
 from warpedfoam.io import load, write_columns_csv, write_record
 from warpedfoam.io.atomic import writable_path
@@ -44,12 +45,7 @@ def inspect_file(
     """
     foam = load(file)
     found = defects(foam, tiny=tiny)
-    folder = Path(file).parent if out is None else Path(out)
-    if out is not None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except FileExistsError:
-            raise NotADirectoryError(f"the output folder {out} is a file; choose another with -o") from None
+    folder = Path(file).parent if out is None else output_folder(out)
     names = [f"{table}.csv" for table in TABLES] + ([PICTURE] if picture else [])
     paths = {name: writable_path(folder / name) for name in names}
     record = writable_path(folder / RECORD)

@@ -28,7 +28,13 @@ def run_file(
     study = read_study(file, sets)
     done = run_ensemble(study, out, workers=workers, scheduler=scheduler, progress=progress)
     record = {k: v for k, v in done.record.items() if k not in ("versions", "environments")}
-    return {**record, "environments": len(done.record["environments"]), "columns": len(done.columns)}
+    reasons = [reason for reason in done.columns["reason"] if reason]
+    return {
+        **record,
+        "environments": len(done.record["environments"]),
+        "columns": len(done.columns),
+        "first_reason": reasons[0] if reasons else None,
+    }
 
 
 def ensemble_text(facts: Mapping[str, Any]) -> str:

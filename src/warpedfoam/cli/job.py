@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from warpedfoam.cli.folders import output_folder
 from warpedfoam.cli.progress import Progress, silent
 from warpedfoam.foam import Foam
 from warpedfoam.relax.result import Relaxation
@@ -70,7 +70,7 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
     from warpedfoam.relax import relax
     from warpedfoam.tessellate import voronoi_foam
 
-    folder = _folder(options.output.folder)
+    folder = output_folder(options.output.folder)
     started = datetime.now(UTC)
     cell = options.plates
     chosen = options.foam
@@ -117,18 +117,6 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
     write_record(folder / RECORD, record)
     progress("write", 1.0)
     return Job(relaxed, record)
-
-
-def _folder(name: str) -> Path:
-    """Make the folder, or say now, not after the run, that it cannot be written."""
-    folder = Path(name)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise NotADirectoryError(f"the output folder {name} is a file; choose another with -o") from None
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(f"the output folder {name} cannot be written; choose another with -o")
-    return folder
 
 
 def _tidy(folder: Path) -> None:

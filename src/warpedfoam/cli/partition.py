@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
 from warpedfoam.analysis import point_group
+from warpedfoam.cli.folders import output_folder
 from warpedfoam.cli.progress import Progress
 from warpedfoam.io import save, versions, write_columns_csv, write_record
 from warpedfoam.studies import MinimalPartition, minimal_partition
@@ -41,11 +42,7 @@ def search(
         ``name=value`` each.
     """
     chosen = _surface(surface, sizes)
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise NotADirectoryError(f"the output folder {out} is a file; choose another with -o") from None
+    folder = output_folder(out)
     (folder / RECORD).unlink(missing_ok=True)
     built = chosen.build()
     found = minimal_partition(

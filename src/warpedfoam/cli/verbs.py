@@ -202,7 +202,8 @@ def ensemble(
             print(ensemble_text(facts), flush=True)
     bad = {state: n for state, n in facts["counts"].items() if n and state != "converged"}
     if bad:
-        say(", ".join(f"{n} of {facts['runs']} runs {state}" for state, n in bad.items()) + "; see the table")
+        counts = ", ".join(f"{n} of {facts['runs']} runs {state}" for state, n in bad.items())
+        say(f"{counts}; see the table; the first says: {facts['first_reason']}")
         raise typer.Exit(NOT_CONVERGED)
 
 

@@ -8,7 +8,7 @@ from warpedfoam.io.graphs import write_graph_json, write_graphml
 from warpedfoam.io.importing import import_polygons
 from warpedfoam.io.meshes import write_mesh
 from warpedfoam.io.obj import write_obj
-from warpedfoam.io.parquet import write_bubbles_parquet, write_films_parquet
+from warpedfoam.io.parquet import write_bubbles_parquet, write_columns_parquet, write_films_parquet
 from warpedfoam.io.ply import write_ply
 from warpedfoam.io.record import versions, write_record
 from warpedfoam.io.state import load, save
@@ -32,6 +32,7 @@ __all__ = [
     "write_bubbles_csv",
     "write_bubbles_parquet",
     "write_columns_csv",
+    "write_columns_parquet",
     "write_fe",
     "write_films_csv",
     "write_films_parquet",

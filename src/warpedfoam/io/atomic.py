@@ -100,6 +100,13 @@ def atomic_binary(path: PathLike) -> Iterator[BinaryIO]:
         yield cast(BinaryIO, stream)
 
 
+def named(fault: BaseException, target: Path) -> BaseException:
+    """The fault; one of the system's that names no file, such as a full disk, with the file's name."""
+    if isinstance(fault, OSError) and fault.errno is not None and fault.filename is None:
+        return OSError(fault.errno, fault.strerror, str(target)).with_traceback(fault.__traceback__)
+    return fault
+
+
 @contextmanager
 def _replacing(target: Path, mode: str) -> Iterator[IO[str] | IO[bytes]]:
     target = target.resolve()  # through a link, so that the link stays one
@@ -117,6 +124,6 @@ def _replacing(target: Path, mode: str) -> Iterator[IO[str] | IO[bytes]]:
         if target.exists():
             shutil.copymode(target, temporary)
         os.replace(temporary, target)
-    except BaseException:  # KeyboardInterrupt too: no litter
+    except BaseException as fault:  # KeyboardInterrupt too: no litter
         temporary.unlink(missing_ok=True)
-        raise
+        raise named(fault, target) from None

@@ -1,13 +1,15 @@
-"""The tables of bubbles and films as Parquet files."""
+"""Tables as Parquet files: those of bubbles and films, and any columns of plain values."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, atomic_binary, writable_path
 from warpedfoam.io.reading import extra
-from warpedfoam.io.tables import Columns, bubble_columns, film_columns
+from warpedfoam.io.tables import bubble_columns, film_columns
 
 
 def write_bubbles_parquet(path: PathLike, foam: Foam) -> Path:
@@ -60,11 +62,37 @@ def write_films_parquet(path: PathLike, foam: Foam) -> Path:
     return _write(writable_path(path, suffixes=(".parquet",)), film_columns(foam))
 
 
-def _write(target: Path, columns: Columns) -> Path:
+def write_columns_parquet(path: PathLike, columns: Mapping[str, Sequence[Any]]) -> Path:
+    """Write columns of plain values: integers of 64 bits, doubles, truth values, texts; None is null.
+
+    Parameters
+    ----------
+    path : str or path
+    columns : mapping of str to sequences
+        Of equal length; the values of a column are of one type. A column without a value is one of doubles.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    ImportError
+        If pyarrow is not installed (the extra ``formats``).
+    FileNotFoundError, IsADirectoryError
+        If the path cannot be written.
+    """
+    return _write(writable_path(path), columns)
+
+
+def _write(target: Path, columns: Mapping[str, Sequence[Any]]) -> Path:
     arrow, parquet = extra("pyarrow", "Parquet"), extra("pyarrow.parquet", "Parquet")
-    # a column without a value would have no type
-    kinds = {name: arrow.float64() if values[0] is None else None for name, values in columns.items()}
-    table = arrow.table({name: arrow.array(values, kinds[name]) for name, values in columns.items()})
+    types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64(), str: arrow.string()}
+    arrays = {}
+    for name, values in columns.items():
+        kinds = {type(value) for value in values if value is not None}
+        arrays[name] = arrow.array(values, types[kinds.pop()] if kinds else types[float])
     with atomic_binary(target) as stream:
-        parquet.write_table(table, stream)
+        parquet.write_table(arrow.table(arrays), stream)
     return target

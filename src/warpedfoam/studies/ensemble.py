@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from warpedfoam.arrays import as_instance, as_integer, frozen
 from warpedfoam.foam import Foam
-from warpedfoam.io import load, versions, write_record
+from warpedfoam.io import load, versions, write_columns_parquet, write_record
 from warpedfoam.io.atomic import PathLike, as_path
-from warpedfoam.studies.ensemble_table import Columns, table_columns, write_csv, write_parquet
+from warpedfoam.studies.ensemble_table import Columns, table_columns, write_csv
 from warpedfoam.studies.journal import Journal, opened
 from warpedfoam.studies.member import STATES, Task
 from warpedfoam.studies.pool import computed, require_packages
@@ -200,7 +200,7 @@ def run_ensemble(
                 outcomes.close()  # the workers too, whatever ended the loop
         columns = _columns(study, journal, lost)
         write_csv(place / TABLE_CSV, columns)
-        write_parquet(place / TABLE_PARQUET, columns)
+        write_columns_parquet(place / TABLE_PARQUET, columns)
         used = [journal.rows[run.key] for run in study.runs if run.key in journal.rows]
         names = sorted({row["environment"] for row in used})
         record = {

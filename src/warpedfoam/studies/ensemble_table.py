@@ -1,4 +1,4 @@
-"""The table of an ensemble: columns from runs and their outcomes, as CSV and as parquet."""
+"""The table of an ensemble: columns from runs and their outcomes, and as CSV."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warpedfoam.io import atomic_binary, write_columns_csv
+from warpedfoam.io import write_columns_csv
 from warpedfoam.studies.observables import COUNTED, Value
 
 Columns = dict[str, list[Value]]
@@ -46,21 +46,6 @@ def table_columns(rows: Iterable[Mapping[str, Value]], measured: Iterable[Mappin
 def write_csv(path: Path, columns: Columns) -> Path:
     """Write the table as CSV, floats with all their digits."""
     return write_columns_csv(path, {name: _objects(values) for name, values in columns.items()})
-
-
-def write_parquet(path: Path, columns: Columns) -> Path:
-    """Write the table as parquet: integers of 64 bits, doubles, booleans, texts; blanks are nulls."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    types = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
-    arrays = {}
-    for name, values in columns.items():
-        kinds = {type(value) for value in values if value is not None}
-        arrays[name] = pa.array(values, types[kinds.pop()] if kinds else pa.float64())
-    with atomic_binary(path) as stream:
-        parquet.write_table(pa.table(arrays), stream)
-    return path
 
 
 def _of_one_type(values: list[Value]) -> list[Value]:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from warpedfoam.errors import FileFormatError
-from warpedfoam.io.atomic import atomic_binary
+from warpedfoam.io.atomic import atomic_binary, named
 from warpedfoam.studies.member import Outcome, environment_name
 
 JOURNAL, STATES, LOCK = "runs.jsonl", "states", ".lock"
@@ -66,15 +66,19 @@ class Journal:
         self.rows[outcome.key] = row
 
     def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
+        """Close the file; what a full disk has not taken is lost, as in a kill."""
+        with suppress(OSError):
+            self._stream.close()
 
     def _write(self, content: Mapping[str, Any]) -> None:
         # repr of a float, which is what JSON gets, comes back as the same float
         line = json.dumps(content, allow_nan=False, ensure_ascii=False)
-        self._stream.write(line.encode("utf-8") + b"\n")
-        self._stream.flush()
-        os.fsync(self._stream.fileno())
+        try:
+            self._stream.write(line.encode("utf-8") + b"\n")
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
+        except OSError as fault:
+            raise named(fault, self._path) from None
 
     def _read(self) -> None:
         if not self._path.exists():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import importlib
 import math
 import re
@@ -10,6 +11,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -167,12 +169,15 @@ class Observable:
         The one part of a group that is asked for; empty for all.
     options : tuple of (str, value) pairs
         Of a charge profile.
+    mark : str
+        Stands for the content of the file that a function of the user's comes from.
     """
 
     name: str
     base: str
     part: str = ""
     options: tuple[tuple[str, Any], ...] = ()
+    mark: str = field(default="", repr=False)
 
     def evaluate(self, measured: Measured) -> Values:
         """Measure the foam; columns of the table by name.
@@ -240,7 +245,7 @@ def observable_from(value: Any, name: str) -> Observable:
         raise TypeError(f"{name} must be the name of an observable or a table with a kind, got {value!r}")
     if ":" in value:
         _require_importable(value, name)
-        return Observable(value.rpartition(":")[2], value)
+        return Observable(value.rpartition(":")[2], value, mark=_file_mark(value))
     base, _, part = value.partition(".")
     if value in SINGLE or value in GROUPS:
         return Observable(value, value)
@@ -288,6 +293,14 @@ def _require_importable(text: str, name: str) -> None:
         raise ValueError(f"{name}: {fault}") from None
 
 
+def _file_mark(text: str) -> str:
+    """SHA-256 of the file of ``"module:function"``: results of a function that was edited are another's."""
+    file = getattr(sys.modules[text.partition(":")[0]], "__file__", None)
+    if not file or not Path(file).is_file():
+        return ""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
+
+
 @lru_cache(maxsize=8)
 def _parts(group: str) -> tuple[str, ...]:
     """Names of the parts of a group, and of groups inside it, from the foam of four triangles."""
@@ -324,6 +337,7 @@ def _profile_from(value: Mapping[str, Any], name: str) -> Observable:
         title,
         "charge_profile",
         options=(("coordinate", coordinate), ("edges", tuple(edges.tolist())), ("n_nodes", nodes)),
+        mark=_file_mark(str(coordinate)) if ":" in str(coordinate) else "",
     )
 
 

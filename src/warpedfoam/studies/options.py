@@ -375,6 +375,12 @@ def _override(values: dict[str, Any], origins: dict[str, str], text: str) -> Non
     except tomllib.TOMLDecodeError:
         parsed = value
     section, _, leaf = name.rpartition(".")
+    if name.startswith("grid.") and isinstance(values.get("grid", {}), dict):
+        # the axes of a study are options too; the whole name stands for one in sections
+        section, leaf = "grid", name.removeprefix("grid.")
+        outer, _, inner_name = leaf.partition(".")
+        if isinstance(values.get("grid", {}).get(outer), dict):
+            values["grid"][outer].pop(inner_name, None)
     if "." in section:
         raise ValueError(f"--set {text}: there is no option {name}; write it as section.name=value")
     if section and section not in values:

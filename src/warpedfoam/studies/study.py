@@ -189,7 +189,7 @@ class Study:
                 else:
                     seed = seeds[repeat]
                 full = {**values, "seed": seed}
-                key = _digest([content, seed, [repr(measure) for measure in self.measures]])[:24]
+                key = _digest([content, seed, [repr(m) + m.mark for m in self.measures]])[:24]
                 shown = ", ".join(f"{name} = {value}" for name, value in parameters.items())
                 if key in keys:
                     raise ValueError(f"{self.source}: two runs are the same: {shown} and {keys[key]}")
