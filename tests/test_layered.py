@@ -239,3 +239,25 @@ def test_an_unfinished_foam_is_not_let_go() -> None:
 def test_markers_are_refused() -> None:
     with pytest.raises(ValueError, match="without marker vertices"):
         wf.relax(hemispheres(0.05, n_markers=4, order=8, tilt=0.1), layers=2)
+
+
+def test_bulging_bubbles_hold_their_volumes_where_they_reach_round_the_tube() -> None:
+    """The flux of θ (−y, x, 0) through their films, a field along the plates: neither fans nor forms."""
+    cell = wf.HeleShawCell(wf.Torus(2.0, 1.0), 0.1)
+    result = wf.relax(wf.voronoi_foam(cell, 12, seed=15, lloyd=2), order=12, layers=4)
+    assert isinstance(result, LayeredRelaxation)
+    assert result.converged
+    along, up = lobatto(12), lobatto(4)
+    x = result.film_points
+    lines = np.einsum("ij,kfjx->kfix", along.derivative, x)
+    rises = np.einsum("lk,kfjx->lfjx", up.derivative, x)
+    network = result.foam.network
+    found = np.zeros(12)
+    middle = np.arctan2(*result.foam.bubble_centres[:, 1::-1].T)
+    for bubble, sign in ((network.left, 1.0), (network.right, -1.0)):
+        turned = np.arctan2(x[..., 1], x[..., 0]) - middle[bubble][:, None]
+        theta = np.angle(np.exp(1j * turned))
+        field = np.stack([-x[..., 1] * theta, x[..., 0] * theta, np.zeros_like(theta)], axis=-1)
+        through = np.einsum("kfjx,kfjx->kfj", field, np.cross(lines, rises))
+        np.add.at(found, bubble, sign * np.einsum("k,j,kfj->f", up.weights, along.weights, through))
+    np.testing.assert_allclose(found, result.foam.target_volumes, rtol=2e-7)

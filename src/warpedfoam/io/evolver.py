@@ -2,47 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, as_choice, as_instance, as_integer
+from warpedfoam.arrays import as_choice, as_instance, as_integer
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
+from warpedfoam.io.evolver_forms import rest_of
 from warpedfoam.io.evolver_formulas import Formulas, formulas_of
+from warpedfoam.io.evolver_sheets import sheets
+from warpedfoam.io.evolver_strings import strings
 
-MODELS = ("ruled", "string")
+MODELS = ("ruled", "string", "soapfilm")
 
 
-def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int = 4) -> Path:
-    """Write ``foam`` as a datafile of Brakke's Surface Evolver (string model).
+def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int = 4, layers: int = 1) -> Path:
+    """Write ``foam`` as a datafile of Brakke's Surface Evolver.
 
-    Films become chains of straight edges whose vertices lie on the inner plate, a constraint given by its
-    formula. A vertex inside a film stays on a plane across the film (a constraint with the vertex
-    attribute ``side``): without it vertices slide along films to gain length, which is an error of the
-    discretisation and not of the foam. Volumes are named quantities ``bubble_<id>``: integrals
-    of a one-form along edges, with the form's cut on the far side of the surface. The last bubble has none,
-    because the others fix its volume; pressures are relative to it. Rotations of the surface are pinned.
+    *String models*. Films become chains of straight edges whose vertices lie on the inner plate, a
+    constraint given by its formula. A vertex inside a film stays on a plane across the film (a constraint
+    with the vertex attribute ``side``): without it vertices slide along films to gain length, which is an
+    error of the discretisation and not of the foam. Volumes are named quantities ``bubble_<id>``: integrals
+    of a one-form along edges, with the form's cut on the far side of the surface.
 
-    The energy and the volumes of the file converge to those of ``foam.energy`` and ``target_volumes`` like
-    segments⁻² (Richardson's extrapolation of two files gains two orders). In the Evolver::
+    *Soapfilm model*. Films become curved triangles (quadratic elements) from plate to plate, whose edges
+    slide on both plates, each a constraint by its formula, so that they end at right angles; they may bulge
+    as those of ``relax(foam, layers=4)``. Volumes are fluxes through films of a vector field of divergence
+    1 that runs along the plates.
+
+    The exterior, or else the last bubble, has no quantity, because the others fix its volume; pressures are
+    relative to it. Motions of the surface into itself are pinned.
+
+    The energy and the volumes of a string model converge to those of ``foam.energy`` and
+    ``target_volumes`` like segments⁻², those of the soapfilm model to the bulging foam's like segments⁻⁴
+    (Richardson's extrapolation of two files gains two orders). In the Evolver::
 
         m 0; g 1; hessian; hessian; hessian; dump "foam.dmp"
 
-    computes pressures, solves, and writes what `read_dmp` reads.
+    computes pressures, solves, and writes what `read_dmp` reads; ``r`` refines the soapfilm model.
 
     Parameters
     ----------
     path : str or path
         Ends in ``.fe``.
     foam : Foam
-        On a `Sphere` or a `Torus`, all its bubbles disks.
-    model : {"ruled", "string"}, optional
+        All its bubbles disks, but for an exterior. String models: on a `Sphere`, `Torus`, `Cylinder`,
+        `Catenoid`, `Ellipsoid` or `FlatTorus` (in the Evolver's torus model). Soapfilm model: on those whose
+        outer plate has a formula too, a `Sphere`, `Torus`, `Cylinder` or `FlatTorus`.
+    model : {"ruled", "string", "soapfilm"}, optional
         ``"ruled"`` (default): films as this package has them, γ ∫∫ |(I + tW)T| ds dt, with Gauss points in
         t, and Steiner's volumes. ``"string"``: leading order in the gap d, γ d times length and d times
-        area.
+        area. ``"soapfilm"``: films free to bulge.
     segments : int, optional
         Edges per film, at least 1.
+    layers : int, optional
+        Edges from plate to plate in the soapfilm model, at least 1.
 
     Returns
     -------
@@ -54,15 +70,15 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     TypeError
         If an argument is of the wrong type.
     ValueError
-        If the surface has no formulas here, the gap varies, a bubble is no disk, or the name does not end in
-        ``.fe``.
+        If the surface has no formulas here, the gap varies, a bubble is no disk or too large for its form,
+        or the name does not end in ``.fe``.
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
 
     References
     ----------
     K. A. Brakke, The Surface Evolver, Experimental Mathematics 1, 141–165 (1992), and its manual, version
-    2.70: chapters on datafiles, named quantities and the string model.
+    2.70: chapters on datafiles, named quantities, the string, soapfilm and torus models.
 
     Examples
     --------
@@ -81,104 +97,75 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     as_instance(foam, "foam", Foam)
     kind = as_choice(model, "model", MODELS)
     n = as_integer(segments, "segments", minimum=1, maximum=1000)
+    rows = as_integer(layers, "layers", minimum=1, maximum=1000)
     foam.cell.parallel_gap("write_fe")
-    if (foam.network.bubble_euler != 1).any():
-        bad = int(np.flatnonzero(foam.network.bubble_euler != 1)[0])
+    odd = foam.network.bubble_euler != 1
+    odd[rest_of(foam)] &= foam.exterior is None
+    if odd.any():
+        bad = int(np.argmax(odd))
         raise ValueError(f"foam must consist of disks, but bubble {bad} is none: its volume is no one-form")
-    formulas = formulas_of(foam, ruled=kind == "ruled")
-    with atomic_text(target) as stream:
-        stream.write(
-            "\n".join([*_head(foam, formulas), *_vertices(foam, formulas, n), *_edges(foam, formulas, n)])
+    formulas = formulas_of(foam, ruled=kind != "string")
+    if kind == "soapfilm" and (formulas.outer is None or formulas.flux is None):
+        raise ValueError(
+            f"the soapfilm model needs a formula of the outer plate, which is none over a "
+            f"{type(foam.cell.surface).__name__}; use model='ruled'"
         )
+    head = _head(foam, formulas, kind)
+    body = sheets(foam, formulas, n, rows) if kind == "soapfilm" else strings(foam, formulas, n)
+    with atomic_text(target) as stream:
+        stream.writelines(f"{line}\n" for line in head)
+        stream.writelines(f"{line}\n" for line in body)
         # without it fewer than 50 volumes are eliminated from a Hessian that may be singular by itself
-        stream.write("\n\nread\naugmented_hessian on\n")
+        stream.write("\nread\naugmented_hessian on\n")
     return target
 
 
-def _head(foam: Foam, formulas: Formulas) -> list[str]:
-    lines = [
-        f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.mean_gap!r} apart, "
-        "written by warpedfoam",
-        f"// pressures are relative to bubble_{foam.bubble_ids[-1]}, whose volume follows from the others'",
-        "string",
-        "space_dimension 3",
-        "integral_order_1D 8",
-        "define vertex attribute side real[4]",
-        "",
-        "constraint 1",
-        f"formula: {formulas.surface}",
-        "constraint 2",
-        "formula: side[1]*x + side[2]*y + side[3]*z = side[4]",
+def _head(foam: Foam, formulas: Formulas, model: str) -> Iterable[str]:
+    rest, period = rest_of(foam), foam.cell.surface.period
+    last = foam.bubble_ids[rest]
+    yield f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.mean_gap!r} apart, written by warpedfoam"
+    yield f"// pressures are relative to bubble_{last}, whose volume follows from the others'"
+    if model == "soapfilm":
+        yield from ("soapfilm", "quadratic", "space_dimension 3", "integral_order_2D 10")
+    else:
+        yield from (
+            "string",
+            "space_dimension 3",
+            "integral_order_1D 8",
+            "define vertex attribute side real[4]",
+        )
+    if period is not None:
+        # directions without a period get one that nothing crosses
+        box = np.where(np.isfinite(period), period, 4.0 * foam.cell.surface.size + 4.0 * foam.cell.mean_gap)
+        yield from ("torus", "periods", *(" ".join(map(repr, row)) for row in np.diag(box).tolist()))
+    yield from ("", "constraint 1", f"formula: {formulas.surface}", "constraint 2")
+    if model == "soapfilm":
+        yield f"formula: {formulas.outer}"
+    else:
+        yield "formula: side[1]*x + side[2]*y + side[3]*z = side[4]"
+    extra = [equation for equation, _ in formulas.rims]
+    extra += [
+        " + ".join(f"({a!r})*{e}" for a, e in zip(normal.tolist(), "xyz", strict=True)) + " = 0"
+        for _, normal in formulas.pinned
     ]
-    if formulas.pin is not None:
-        a, b, c = formulas.pin.tolist()
-        lines += ["constraint 3", f"formula: ({a!r})*x + ({b!r})*y + ({c!r})*z = 0"]
-    if formulas.energy is not None:
-        lines += [
+    for place, equation in enumerate(extra):
+        yield from (f"constraint {place + 3}", f"formula: {equation}")
+    if formulas.energy is not None and model != "soapfilm":
+        yield from (
             "",
             "quantity film_energy energy global_method edge_general_integral",
             f"scalar_integrand: {formulas.energy}",
-        ]
-    targets = (foam.target_volumes * formulas.volume_share).tolist()
-    for place in range(foam.n_bubbles - 1):
+        )
+    targets = (foam.target_volumes * (formulas.volume / foam.cell.volume)).tolist()
+    for place in range(foam.n_bubbles):
+        if place == rest:
+            continue
+        start = f"quantity bubble_{foam.bubble_ids[place]} fixed = {targets[place]!r} method"
         form = formulas.one_form(place)
-        lines += [
-            "",
-            f"quantity bubble_{foam.bubble_ids[place]} fixed = {targets[place]!r} "
-            "method edge_vector_integral",
-            "vector_integrand:",
-            *(f"q{k + 1}: {part}" for k, part in enumerate(form)),
-        ]
-    return [*lines, ""]
-
-
-def _vertices(foam: Foam, formulas: Formulas, segments: int) -> list[str]:
-    """The foam's vertices, then film by film those between."""
-    held = dict.fromkeys(formulas.on_pin, " constraint 1 3") | dict.fromkeys(formulas.fixed, " fixed")
-    rows = [
-        f"{k + 1} {x!r} {y!r} {z!r}{held.get(k, ' constraint 1')}"
-        for k, (x, y, z) in enumerate(foam.vertex_points.tolist())
-    ]
-    between, along = _inner_points(foam, segments)
-    offset = np.einsum("fkx,fkx->fk", between, along)
-    numbers = np.concatenate([between, along, offset[:, :, None]], axis=2).reshape(-1, 7)
-    start = len(rows) + 1
-    rows += [
-        f"{start + k} {x!r} {y!r} {z!r} constraint 1 2 side {{{a!r}, {b!r}, {c!r}, {d!r}}}"
-        for k, (x, y, z, a, b, c, d) in enumerate(numbers.tolist())
-    ]
-    return ["vertices", *rows, ""]
-
-
-def _inner_points(foam: Foam, segments: int) -> tuple[Floats, Floats]:
-    """Points inside each film and unit vectors along it there, two (n_films, segments − 1, 3) arrays.
-
-    Chords of a parabola cut off 1/segments² of the area under it, so the points lie that much farther
-    out: the file starts near its volumes.
-    """
-    xi = np.arange(1, segments) / segments
-    step = 0.25 / segments
-    tail, head = foam.film_ends
-    offsets = foam.film_offsets * (segments**2 / max(segments**2 - 1, 1))
-    arcs = foam.cell.surface.arc_points
-    points, behind, ahead = (arcs(tail, head, offsets, xi + s) for s in (0.0, -step, step))
-    along = ahead - behind
-    return points, along / np.linalg.norm(along, axis=2, keepdims=True)
-
-
-def _edges(foam: Foam, formulas: Formulas, segments: int) -> list[str]:
-    network = foam.network
-    first = network.n_vertices + 1 + np.arange(network.n_films * (segments - 1)).reshape(-1, segments - 1)
-    chains = np.concatenate(
-        [network.tails[:, None] + 1, first.reshape(network.n_films, -1), network.heads[:, None] + 1], axis=1
-    )
-    # the Evolver's own length carries the energy where the films have no density
-    density = f" tension {formulas.tension!r}"
-    names = [f" bubble_{i}" for i in foam.bubble_ids.tolist()]
-    left = [names[b] if b < foam.n_bubbles - 1 else "" for b in network.left.tolist()]
-    right = [f"{names[b]} -" if b < foam.n_bubbles - 1 else "" for b in network.right.tolist()]
-    rows = ["edges"]
-    for film, chain in enumerate(chains.tolist()):
-        tail = f" constraint 1{density}{left[film]}{right[film]}"
-        rows += [f"{film * segments + k + 1} {chain[k]} {chain[k + 1]}{tail}" for k in range(segments)]
-    return rows
+        if model == "soapfilm":
+            assert formulas.flux is not None
+            form, start = formulas.flux(place), f"{start} facet_vector_integral"
+        else:
+            start = f"{start} edge_vector_integral"
+        yield from ("", start, "vector_integrand:", *(f"q{k + 1}: {part}" for k, part in enumerate(form)))
+    yield ""

@@ -12,6 +12,7 @@ from warpedfoam.arrays import Floats, Ints, as_instance, frozen
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path
+from warpedfoam.io.evolver_forms import rest_of
 from warpedfoam.io.reading import text_of
 
 _FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -50,7 +51,9 @@ class EvolverDump:
     pressures: dict[str, float]
 
     def bubble_pressures(self, foam: Foam) -> Floats:
-        """Pressures (n_bubbles,) of the bubbles of a foam that `write_fe` wrote, with mean zero.
+        """Pressures (n_bubbles,) of the bubbles of a foam that `write_fe` wrote.
+
+        Their mean is zero, or an exterior's pressure is.
 
         Raises
         ------
@@ -60,15 +63,16 @@ class EvolverDump:
             If the dump is of other bubbles.
         """
         as_instance(foam, "foam", Foam)
-        names = [f"bubble_{i}" for i in foam.bubble_ids[:-1].tolist()]
+        rest = rest_of(foam)
+        names = [f"bubble_{i}" for i in np.delete(foam.bubble_ids, rest).tolist()]
         missing = [name for name in names if name not in self.pressures]
         if missing or len(self.pressures) != len(names):
             raise ValueError(
                 f"foam has {foam.n_bubbles} bubbles, but the dump holds {len(self.pressures)} volumes"
                 + (f" and no {missing[0]}" if missing else "")
             )
-        values = np.array([*(self.pressures[name] for name in names), 0.0])
-        out: Floats = values - values.mean()
+        values = np.insert(np.array([self.pressures[name] for name in names]), rest, 0.0)
+        out: Floats = values if foam.exterior is not None else values - values.mean()
         return out
 
 

@@ -295,10 +295,12 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
             fatal = "stopped: the Newton matrix is singular"
             break
         longest = float(np.abs(step[: system.n_vertex]).max())
+        # offsets are in units of chords, about as long as a bubble
+        longest = max(longest, foam.bubble_size * float(np.abs(step[system.n_vertex :]).max(initial=0.0)))
         share = min(1.0, LONGEST * foam.bubble_size / max(longest, 1e-300))
         trial = system.moved(state, share * step, share * change)
-        ahead = system.terms(trial) if np.isfinite(trial.points).all() else None
-        if ahead is None or not np.isfinite(ahead.energy + ahead.volumes.sum()):
+        ahead = _terms_at(system, trial)
+        if ahead is None:
             fatal = "stopped: a step left the surface"
             break
         state, terms = trial, ahead
@@ -335,6 +337,17 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
         ruled_energy=ruled.energy,
         contact_error=terms.contact_error,
     )
+
+
+def _terms_at(system: LayeredSystem, state: _State) -> _Terms | None:
+    """Everything at a state, or None where nodes find no place on the surface."""
+    if not np.isfinite(state.points).all():
+        return None
+    try:
+        terms = system.terms(state)
+    except ValueError:  # a node is not finite
+        return None
+    return terms if np.isfinite(terms.energy + terms.volumes.sum()) else None
 
 
 def _newton(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpedfoam.arrays import Floats
+from warpedfoam.kernels.loops import Loops
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.protocol import Layer, Surface
@@ -72,6 +73,19 @@ class _LevelForm(LevelSurface):
     def integral(self, layer: Layer) -> float:
         """That of the surface, exact."""
         return self.closed.integral(layer)
+
+    def loop_integrals(
+        self, tail: Floats, head: Floats, offsets: Floats, loops: Loops, layer: Layer
+    ) -> Floats:
+        """On a torus those of its one-form: bubbles that reach round the tube are no fans."""
+        if not isinstance(self.closed, Torus):
+            return super().loop_integrals(tail, head, offsets, loops, layer)
+        placed = self._arcs(tail, head, offsets)
+        x = placed.points
+        tube = np.arctan2(x[..., 2], np.hypot(x[..., 0], x[..., 1]) - self.closed.major_radius)
+        ring = np.unwrap(np.arctan2(x[..., 1], x[..., 0]), axis=0)
+        slope, turned = placed.rule.derivative @ ring, ring[-1] - ring[0]
+        return self.closed.round_loops(placed.rule, np.unwrap(tube, axis=0), slope, turned, loops, layer)
 
     def rigid_motions(self, points: Floats) -> Floats:
         """Those of the surface, exact."""

@@ -13,7 +13,7 @@ from warpedfoam.kernels import revolution_arcs as arcs
 from warpedfoam.kernels.lattice import best_lattice
 from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.nodal import bump_offsets, shape_values
-from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.kernels.quadrature import LobattoRule, lobatto
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.protocol import SIZES, ArcTerms, Layer
 from warpedfoam.surfaces.rings import stitched_rings
@@ -309,16 +309,21 @@ class Torus:
         self, tail: Floats, head: Floats, offsets: Floats, loops: Loops, layer: Layer
     ) -> Floats:
         """−∮ (αφ + β sin φ) dθ with φ continued along each loop, for loops of disks."""
-        alpha, beta = self._one_form(layer)
         nodes = self._nodes(tail, head, offsets)
-        f = alpha * nodes.phi + beta * np.sin(nodes.phi)
+        return self.round_loops(nodes.rule, nodes.phi, nodes.dtheta, nodes.turned[4], loops, layer)
+
+    def round_loops(
+        self, rule: LobattoRule, phi: Floats, slope: Floats, turned: Floats, loops: Loops, layer: Layer
+    ) -> Floats:
+        """`loop_integrals` from φ and dθ/dξ at the nodes of arcs (K, F), and Δθ of each, (F,)."""
+        alpha, beta = self._one_form(layer)
+        f = alpha * phi + beta * np.sin(phi)
         # each arc's one-form is measured from its tail, each loop's from its first point: the large
         # exact parts cancel round a loop, and would leave their round-off
-        along = nodes.rule.weights @ ((f - f[0]) * nodes.dtheta)
-        dtheta = nodes.turned[4]
+        along = rule.weights @ ((f - f[0]) * slope)
         film, back = loops.halves >> 1, (loops.halves & 1).astype(bool)
         sign = np.where(back, -1.0, 1.0)
-        first, last = nodes.phi[0][film], nodes.phi[-1][film]
+        first, last = phi[0][film], phi[-1][film]
         start, end = np.where(back, last, first), np.where(back, first, last)
         jump = np.zeros(len(film))
         jump[1:] = np.round((end[:-1] - start[1:]) / TURN)
@@ -327,7 +332,7 @@ class Torus:
         turns -= np.repeat(turns[loops.starts], sizes)
         here = f[0][film] + TURN * alpha * turns
         here -= np.repeat(here[loops.starts], sizes)
-        terms = sign * (along[film] + here * dtheta[film])
+        terms = sign * (along[film] + here * turned[film])
         out: Floats = -np.add.reduceat(terms, loops.starts)
         return out
 
