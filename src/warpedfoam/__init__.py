@@ -70,6 +70,7 @@ from warpedfoam.io import (
     write_vtm,
     write_vtp,
 )
+from warpedfoam.motion import Drift, DriftEvent, drift, resume_drift
 from warpedfoam.moves import T1Event, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import (
@@ -154,6 +155,8 @@ __all__ = [
     "Correlations",
     "Cylinder",
     "DefectReport",
+    "Drift",
+    "DriftEvent",
     "Ellipsoid",
     "Ensemble",
     "EquilibriumReport",
@@ -203,6 +206,7 @@ __all__ = [
     "cluster_potential",
     "correlations",
     "defects",
+    "drift",
     "drift_path",
     "equilibrium_report",
     "foam_statistics",
@@ -229,6 +233,7 @@ __all__ = [
     "read_study",
     "read_vtp",
     "relax",
+    "resume_drift",
     "run_ensemble",
     "save",
     "save_figure",
