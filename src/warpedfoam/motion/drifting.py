@@ -23,19 +23,24 @@ from warpedfoam.motion.stepper import StepFailed, Stepper
 from warpedfoam.relax.system import State
 
 #: First step, in λ ℓ²/γ; a step below the second share of that is no step.
-FIRST, LEAST = 1e-3, 1e-12
-#: How steps grow and shrink: safety, least and greatest factor, factor after a failure.
-SAFETY, SHRINK, GROW, FAILED = 0.9, 0.2, 2.0, 0.4
+FIRST, LEAST = 1e-3, 1e-10
+#: How steps grow and shrink: safety, least and greatest factor; factors after a failure and after a second.
+SAFETY, SHRINK, GROW, FAILED = 0.9, 0.2, 2.0, (0.4, 0.1)
 #: A film below its cutoff may lose this share of its length in a step.
 LOSS = 0.5
+#: Sweeps that space markers after one step.
+SPACINGS = 6
+#: Without volumes to hold, a bubble below this share of the mean volume has vanished.
+NOTHING = 1e-3
 #: Changes of topology after one step.
 MOST_CHANGES = 20
 
 Progress = Callable[[str, float], None]
 TOO_SHORT = (
-    "stopped: steps became too short at time {time:.6g} ({fault}); a bubble is about to vanish, or a film "
-    "that ends in a marker, or between a bubble and itself, is and may not turn"
+    "stopped: steps became too short at time {time:.6g} ({fault}); a film is about to vanish that may not "
+    "turn: one that ends in a marker, or of a bubble with three sides"
 )
+VANISHED = "stopped: bubble {name} has all but vanished at time {time:.6g}"
 
 
 @dataclass(eq=False)
@@ -234,7 +239,8 @@ def _begun(foam: Foam, options: DriftOptions) -> _Run:
         state = stepper.on_volumes(stepper.state_of(start))
     except StepFailed as fault:
         raise ValueError(
-            f"foam cannot be brought to its volumes ({fault}); relax it first, or begin nearer to rest"
+            f"foam cannot be brought to its volumes ({fault}); relax it first, or let it keep the volumes "
+            "that it has: dataclasses.replace(foam, target_volumes=None)"
         ) from None
     run = _Run(stepper, options, state)
     run.step = options.step or FIRST * stepper.time_scale
@@ -335,11 +341,13 @@ def _travelled(
             _step(run, target)
             if progress is not None:
                 progress("drift", run.time / duration)
+        if run.time > run.times[-1]:
+            # a run that has to stop shows where
+            _keep_frame(run)
+            if writer is not None:
+                _write_frame(run, writer, duration)
         if run.fault:
             break
-        _keep_frame(run)
-        if writer is not None:
-            _write_frame(run, writer, duration)
     if progress is not None:
         progress("drift", 1.0)
     columns = np.array(run.log)
@@ -374,9 +382,9 @@ def _step(run: _Run, target: float) -> None:
             if _lost(run, made.state):
                 raise StepFailed("a film shrinks too fast")
         except StepFailed as fault:
+            run.step = FAILED[bool(run.fault)] * time
             run.fault = str(fault)
             run.rejected += 1
-            run.step = FAILED * time
             continue
         worst = made.error / options.tolerance
         if options.step is None and worst > 1.0:
@@ -399,6 +407,11 @@ def _step(run: _Run, target: float) -> None:
     if options.t1:
         _change_topology(run, before)
     run.log.append((run.time, run.stepper.energy(run.state), made.error, made.dissipation))
+    if not options.hold_volumes:
+        shares = run.stepper.volumes(run.state) / run.stepper.system.mean_volume
+        if shares.min() < NOTHING:
+            name = run.stepper.foam.bubble_ids[int(np.argmin(shares))]
+            run.fault = VANISHED.format(name=name, time=run.time)
 
 
 def _lost(run: _Run, state: State) -> bool:
@@ -415,8 +428,13 @@ def _scene(run: _Run) -> Scene:
 
 def _space_markers(run: _Run, energy: float) -> None:
     """Markers back to the middle between their neighbours, unless the energy would rise by that."""
-    fresh = spaced(run.stepper.foam.cell, run.state)
-    if fresh is None:
+    cell, fresh = run.stepper.foam.cell, run.state
+    for _ in range(SPACINGS):
+        moved = spaced(cell, fresh)
+        if moved is None:
+            break
+        fresh = moved
+    if fresh is run.state:
         return
     try:
         fresh = run.stepper.on_volumes(fresh)

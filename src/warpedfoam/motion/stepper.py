@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpedfoam.arrays import Bools, Floats
+from warpedfoam.arrays import Floats
 from warpedfoam.foam import Foam, bubble_integrals
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.motion.drag import Across, Drag, FrictionLaw, motion_of
@@ -23,8 +23,11 @@ from warpedfoam.relax.system import Linearised, State, Step, System
 
 #: Largest force left on a vertex or node after a step, in γ d, and largest relative error of a volume.
 FORCE, VOLUME = 1e-10, 3e-12
-#: Newton steps of an Euler step; the largest in bubble sizes, and the largest change of a chord in chords.
-NEWTON, REACH, TURN = 14, 0.3, 0.5
+#: Newton steps of an Euler step, and with yield friction; the largest in bubble sizes, and the largest
+#: change of a chord in chords.
+NEWTON, STICKING, REACH, TURN = 14, 60, 0.3, 0.5
+#: With yield friction a step goes to where this share of the force along it is left, found in so many looks.
+SLACK, SEARCHES = 0.3, 12
 #: Steps that bring a foam to its volumes.
 CORRECTIONS = 30
 #: Rounding of kinks in turn, when there is yield friction.
@@ -141,12 +144,14 @@ class Stepper:
             self._require_lower(whole, energy)
             return Advance(whole, 0.0, False, self._dissipation(drag, whole))
         half = self._across(self._between(start, whole, 0.5))
-        middle = self._euler(self._drag(here, half, 0.5 * time), half.state)
+        drag = self._drag(here, half, 0.5 * time)
+        middle = self._euler(drag, half.state)
+        spent = 0.5 * self._dissipation(drag, middle)
         drag = self._drag(self._across(middle), there, 0.5 * time)
         halves = self._euler(drag, whole)
         surface, network = self.foam.cell.surface, start.network
         error = float(motion_of(surface, network, halves, whole).max()) / self.length
-        spent = self._dissipation(drag, halves)
+        spent += 0.5 * self._dissipation(drag, halves)
         beyond = self._between(halves, whole, -1.0)
         try:
             beyond = self._on_volumes(beyond, drag)
@@ -170,16 +175,23 @@ class Stepper:
         here = self._across(start)
         return self._on_volumes(start, self._drag(here, here, 1e-2 * self.time_scale))
 
-    def volume_error(self, state: State) -> float:
-        """Largest relative error of a volume that is held."""
-        if not self.hold_volumes:
-            return 0.0
+    def volumes(self, state: State) -> Floats:
+        """Volumes of all bubbles, the exterior's what is left, (n_bubbles,)."""
         system = self.system
-        volumes = bubble_integrals(system.cell, state.network, state.points, state.offsets, system.cell.layer)
-        relative = np.abs(volumes / system.targets - 1.0)
+        out = bubble_integrals(system.cell, state.network, state.points, state.offsets, system.cell.layer)
         if system.exterior is not None:
-            relative[system.exterior] = 0.0
-        return float(relative.max())
+            out[system.exterior] = 0.0
+            out[system.exterior] = system.targets.sum() - out.sum()
+        return out
+
+    def volume_error(self, state: State) -> float:
+        """Largest relative error of a volume; without exact ones their common part is left out."""
+        volumes, system = self.volumes(state), self.system
+        if system.exterior is None:
+            volumes *= system.targets.sum() / volumes.sum()
+        else:
+            volumes[system.exterior] = system.targets[system.exterior]
+        return float(np.abs(volumes / system.targets - 1.0).max())
 
     def _require_lower(self, state: State, energy: float) -> None:
         if not self.energy(state) <= energy * (1.0 + self.rounding):
@@ -196,7 +208,7 @@ class Stepper:
 
     def _newton(self, state: State, drag: Drag) -> State:
         convex = True
-        for _ in range(NEWTON):
+        for _ in range(STICKING if self.law.yielding else NEWTON):
             lin = self._linearised(state, drag)
             now = lin.residuals
             if not np.isfinite(now.force):
@@ -209,8 +221,36 @@ class Stepper:
                     raise StepFailed("the step's problem is not convex")
                 return state
             step, convex = self._step(lin, now.volume)
-            state = self._moved(state, step)
+            state = self._searched(lin, step, drag) if self.law.yielding else self._moved(state, step)
         raise StepFailed("Newton's method did not converge")
+
+    def _searched(self, lin: Linearised, step: Step, drag: Drag) -> State:
+        """The state where the force along a step has nearly gone: past a kink whole steps go too far."""
+        state, network = lin.state, lin.state.network
+        unknowns = np.concatenate(
+            [step.vertices[network.tails].T, step.vertices[network.heads].T, step.offsets.T]
+        )
+
+        def slope(share: float) -> tuple[State, float]:
+            at = self._moved(state, Step(share * step.vertices, share * step.offsets, share * step.pressures))
+            return at, float((self._linearised(at, drag).force * unknowns).sum())
+
+        first = float((lin.force * unknowns).sum())
+        moved, last = slope(1.0)
+        if not first < 0.0 or last <= -SLACK * first:
+            return moved
+        low, high, below, above = 0.0, 1.0, first, last
+        for _ in range(SEARCHES):
+            # regula falsi by the Illinois rule
+            share = (low * above - high * below) / (above - below)
+            moved, last = slope(share)
+            if abs(last) <= -SLACK * first:
+                break
+            if last < 0.0:
+                low, below, above = share, last, 0.5 * above
+            else:
+                high, above, below = share, last, 0.5 * below
+        return moved
 
     def _on_volumes(self, state: State, drag: Drag) -> State:
         if not self.hold_volumes:
@@ -218,23 +258,16 @@ class Stepper:
         drag.blunt = 1.0
         kept = state.pressures
         for _ in range(CORRECTIONS):
-            if self._held(state):
+            if self.volume_error(state) <= VOLUME:
                 return replace(state, pressures=kept)
             lin = self._linearised(state, drag)
             if not np.isfinite(lin.residuals.force) or lin.slip > self.foam.cell.surface.precision:
                 raise StepFailed("a film has degenerated")
-            step, _ = self._step(lin.loaded(np.zeros_like(lin.force)), lin.residuals.volume)
+            # whatever the energy's curvature, the matrix measures a distance here
+            still = lin.loaded(np.zeros_like(lin.force))
+            step, _ = self._step(still, lin.residuals.volume, positive=True)
             state = replace(self._moved(state, step), pressures=kept)
         raise StepFailed("the volumes could not be reached")
-
-    def _held(self, state: State) -> bool:
-        system = self.system
-        volumes = bubble_integrals(system.cell, state.network, state.points, state.offsets, system.cell.layer)
-        if system.exterior is not None:
-            volumes[system.exterior] = system.targets[system.exterior]
-        else:
-            volumes *= system.targets.sum() / volumes.sum()
-        return float(np.abs(volumes / system.targets - 1.0).max()) <= VOLUME
 
     def _linearised(self, state: State, drag: Drag) -> Linearised:
         self.system.loads = drag
@@ -246,7 +279,7 @@ class Stepper:
             lin.residuals = replace(lin.residuals, volume=lin.volume_fault, volume_error=0.0)
         return lin
 
-    def _step(self, lin: Linearised, fault: Floats) -> tuple[Step, bool]:
+    def _step(self, lin: Linearised, fault: Floats, *, positive: bool = False) -> tuple[Step, bool]:
         """A Newton step, scaled so that nothing turns over, and whether the matrix is that of a minimum."""
         network = lin.state.network
         pressure = np.zeros(network.n_bubbles)
@@ -255,7 +288,7 @@ class Stepper:
             pressure[self.system.exterior or 0] = 1.0
         else:
             pressure[:] = 1.0
-        condensed = lin.condensed(positive=False)
+        condensed = lin.condensed(positive=positive)
         try:
             kkt = KKT(lin, condensed, np.zeros(2 * network.n_vertices), pressure)
         except SingularMatrixError:
@@ -300,15 +333,3 @@ class Stepper:
             one.offsets + share * (other.offsets - one.offsets),
             one.pressures + share * (other.pressures - one.pressures),
         )
-
-    # --- what may turn ----------------------------------------------------------------------------
-
-    def short(self, state: State, cutoff: float) -> Bools:
-        """Films whose chord is shorter than ``cutoff`` bubble sizes, less beside small bubbles."""
-        network, shares = state.network, self.system.shares
-        chord = nearest_image(
-            state.points[network.heads] - state.points[network.tails], self.foam.cell.surface.period
-        )
-        scale = np.minimum(1.0, np.sqrt(np.minimum(shares[network.left], shares[network.right])))
-        out: Bools = np.linalg.norm(chord, axis=1) < cutoff * self.length * scale
-        return out
