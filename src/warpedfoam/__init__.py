@@ -74,10 +74,12 @@ from warpedfoam.motion import Drift, DriftEvent, drift, resume_drift
 from warpedfoam.moves import T1Event, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import (
+    animate,
     plot_charge_energies,
     plot_charge_profile,
     plot_correlations,
     plot_defects,
+    plot_drift,
     plot_foam,
     plot_order,
     plot_potential,
@@ -195,6 +197,7 @@ __all__ = [
     "TrajectoryWriter",
     "TriangleMesh",
     "WarpedFoamError",
+    "animate",
     "anneal",
     "bond_order",
     "bubble_between_plates",
@@ -223,6 +226,7 @@ __all__ = [
     "plot_charge_profile",
     "plot_correlations",
     "plot_defects",
+    "plot_drift",
     "plot_foam",
     "plot_order",
     "plot_potential",

@@ -42,6 +42,8 @@ _FLOATS = ("vertex_points", "film_offsets", "target_volumes", "pressures")
 _DATA = (*_INTS, *_FLOATS, "header")
 #: Looks at a file that is being written, and seconds between them.
 LOOKS, PAUSE = 5, 0.05
+#: Pauses of a writer that finds its file being read.
+WAITS = 100
 _PURPOSE = "HDF5"
 _CHUNK = 4096
 
@@ -186,7 +188,15 @@ class TrajectoryWriter:
                 raise
             self._count = len(old)
             self._time = float(old.times[-1]) if len(old) else -np.inf
-        self._file = self._h5py.File(target, "r+", libver="latest")
+        for look in range(WAITS + 1):
+            try:
+                self._file = self._h5py.File(target, "r+", libver="latest")
+                break
+            except BlockingIOError:
+                # somebody is reading it: not for long
+                if look == WAITS:
+                    raise
+                time.sleep(PAUSE)
         self._file.swmr_mode = True
         mark_open(target)
 

@@ -191,7 +191,7 @@ def drift(
     if going_on and path.exists():
         _recall(run, path)
     else:
-        _create(run, path)
+        _create(run, path, span)
     with TrajectoryWriter(path, append=True) as writer:
         return _travelled(run, span, writer, progress)
 
@@ -257,25 +257,24 @@ def _keep_frame(run: _Run) -> None:
     run.state = run.stepper.state_of(foam)
 
 
-def _create(run: _Run, path: Path) -> None:
+def _create(run: _Run, path: Path, duration: float) -> None:
     """A trajectory with the first frame, there whole or not at all."""
     if path.exists():
         raise FileExistsError(f"cannot write {path}: it is there already; use resume=True or another name")
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         with TrajectoryWriter(temporary) as writer:
-            _write_frame(run, writer, None)
+            _write_frame(run, writer, {"options": run.options.told(), "duration": duration})
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _write_frame(run: _Run, writer: TrajectoryWriter, duration: float | None) -> None:
+def _write_frame(run: _Run, writer: TrajectoryWriter, more: dict[str, Any]) -> None:
     """The last frame with all that is needed to go on from it."""
     log, events = run.noted
     notes: dict[str, Any] = {
-        "options": run.options.told(),
-        "duration": duration,
+        **more,
         "step": run.step,
         "count": run.count,
         "rejected": run.rejected,
@@ -345,7 +344,7 @@ def _travelled(
             # a run that has to stop shows where
             _keep_frame(run)
             if writer is not None:
-                _write_frame(run, writer, duration)
+                _write_frame(run, writer, {})
         if run.fault:
             break
     if progress is not None:

@@ -3,6 +3,7 @@
 from warpedfoam.plot.charted import Charted
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
+from warpedfoam.plot.drift_picture import animate, plot_drift
 from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
 from warpedfoam.plot.new_figures import figure_cylinder, figure_second_order
 from warpedfoam.plot.paper_figures import figure_curvature, figure_gap, figure_spheres, figure_torus_energy
@@ -11,6 +12,7 @@ from warpedfoam.plot.surface_pictures import figure_circles, figure_surface
 
 __all__ = [
     "Charted",
+    "animate",
     "figure_circles",
     "figure_curvature",
     "figure_cylinder",
@@ -23,6 +25,7 @@ __all__ = [
     "plot_charge_profile",
     "plot_correlations",
     "plot_defects",
+    "plot_drift",
     "plot_foam",
     "plot_order",
     "plot_potential",
