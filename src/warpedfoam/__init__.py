@@ -70,14 +70,17 @@ from warpedfoam.io import (
     write_vtm,
     write_vtp,
 )
+from warpedfoam.motion import Drift, DriftEvent, drift, resume_drift
 from warpedfoam.moves import T1Event, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import (
+    animate,
     plot_annealing,
     plot_charge_energies,
     plot_charge_profile,
     plot_correlations,
     plot_defects,
+    plot_drift,
     plot_foam,
     plot_histogram,
     plot_map,
@@ -165,6 +168,8 @@ __all__ = [
     "Correlations",
     "Cylinder",
     "DefectReport",
+    "Drift",
+    "DriftEvent",
     "Ellipsoid",
     "Ensemble",
     "EquilibriumReport",
@@ -209,6 +214,7 @@ __all__ = [
     "TrajectoryWriter",
     "TriangleMesh",
     "WarpedFoamError",
+    "animate",
     "anneal",
     "anneal_points",
     "bond_order",
@@ -221,6 +227,7 @@ __all__ = [
     "cluster_potential",
     "correlations",
     "defects",
+    "drift",
     "drift_path",
     "equilibrium_report",
     "foam_statistics",
@@ -238,6 +245,7 @@ __all__ = [
     "plot_charge_profile",
     "plot_correlations",
     "plot_defects",
+    "plot_drift",
     "plot_foam",
     "plot_histogram",
     "plot_map",
@@ -252,6 +260,7 @@ __all__ = [
     "read_study",
     "read_vtp",
     "relax",
+    "resume_drift",
     "run_ensemble",
     "save",
     "save_figure",

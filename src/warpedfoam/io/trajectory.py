@@ -42,6 +42,8 @@ _FLOATS = ("vertex_points", "film_offsets", "target_volumes", "pressures")
 _DATA = (*_INTS, *_FLOATS, "header")
 #: Looks at a file that is being written, and seconds between them.
 LOOKS, PAUSE = 5, 0.05
+#: Pauses of a writer that finds its file being read.
+WAITS = 100
 _PURPOSE = "HDF5"
 _CHUNK = 4096
 
@@ -109,7 +111,9 @@ class TrajectoryWriter:
         if target.exists():
             self._go_on(target)
 
-    def append(self, foam: Foam, time: float | None = None) -> None:
+    def append(
+        self, foam: Foam, time: float | None = None, *, notes: Mapping[str, Any] | None = None
+    ) -> None:
         """Add ``foam``; when this returns the frame is in the file.
 
         Parameters
@@ -118,6 +122,8 @@ class TrajectoryWriter:
             In the cell of the frames before it.
         time : float, optional
             Above the time of the frame before; 1 more than that by default, from 0.
+        notes : mapping, optional
+            Whatever JSON can hold, kept with the frame; see `Trajectory.notes`.
 
         Raises
         ------
@@ -132,6 +138,10 @@ class TrajectoryWriter:
             raise ValueError(f"time must rise from frame to frame, got {moment:g} after {self._time:g}")
         arrays = arrays_of(foam)
         cell = _cell_of(arrays)
+        if notes is not None:
+            header = {**json.loads(arrays["header"].tobytes()), "notes": dict(notes)}
+            text = json.dumps(header, allow_nan=False, sort_keys=True)
+            arrays["header"] = np.frombuffer(text.encode("utf-8"), dtype=np.uint8)
         if self._cell is not None and not _same_cell(cell, self._cell):
             raise ValueError(
                 "foam must lie in the cell of the frames before it: same surface, gap and heights"
@@ -178,7 +188,15 @@ class TrajectoryWriter:
                 raise
             self._count = len(old)
             self._time = float(old.times[-1]) if len(old) else -np.inf
-        self._file = self._h5py.File(target, "r+", libver="latest")
+        for look in range(WAITS + 1):
+            try:
+                self._file = self._h5py.File(target, "r+", libver="latest")
+                break
+            except BlockingIOError:
+                # somebody is reading it: not for long
+                if look == WAITS:
+                    raise
+                time.sleep(PAUSE)
         self._file.swmr_mode = True
         mark_open(target)
 
@@ -257,6 +275,12 @@ class Trajectory:
             raise FileFormatError(f"cannot read frame {k} of {self.path}: {fault}") from None
         except Exception as fault:
             raise FileFormatError(f"cannot read frame {k} of {self.path}: it is damaged ({fault})") from fault
+
+    def notes(self, frame: int) -> dict[str, Any]:
+        """What was noted with a frame; empty if nothing was."""
+        k = as_integer(frame, "frame", minimum=-len(self), maximum=len(self) - 1)
+        found = json.loads(self._arrays(k % len(self))["header"].tobytes()).get("notes", {})
+        return dict(found)
 
     def __iter__(self) -> Iterator[Foam]:
         return (self[k] for k in range(len(self)))

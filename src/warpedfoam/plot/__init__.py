@@ -3,6 +3,7 @@
 from warpedfoam.plot.charted import Charted
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
+from warpedfoam.plot.drift_picture import animate, plot_drift
 from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
 from warpedfoam.plot.histograms import plot_histogram
 from warpedfoam.plot.histories import plot_annealing, plot_potential_path, plot_relaxation
@@ -14,6 +15,7 @@ from warpedfoam.plot.surface_pictures import figure_circles, figure_surface
 
 __all__ = [
     "Charted",
+    "animate",
     "figure_circles",
     "figure_curvature",
     "figure_cylinder",
@@ -27,6 +29,7 @@ __all__ = [
     "plot_charge_profile",
     "plot_correlations",
     "plot_defects",
+    "plot_drift",
     "plot_foam",
     "plot_histogram",
     "plot_map",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -78,6 +79,14 @@ class Residuals:
     volume_error: float
 
 
+class Loads(Protocol):
+    """Forces on a foam besides those of its films and pressures."""
+
+    def add(self, state: State, force: Floats, hessian: Floats) -> None:
+        """Add them and their derivatives to ``force`` (p + 3, F) and ``hessian`` (p + 3, p + 3, F)."""
+        ...
+
+
 class System:
     """Builds and solves the Newton systems of one foam, and keeps the time they take."""
 
@@ -92,6 +101,9 @@ class System:
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
         self.exterior = exterior
+        # in open clusters markers follow their neighbours
+        self.loose = exterior is not None
+        self.loads: Loads | None = None
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.mean_volume = float(targets.mean())
         if exterior is not None:
@@ -155,11 +167,12 @@ class Linearised:
         self.hessian[:, :4] *= system.length
         self.volume[:4] *= system.length
         self.force[:4] *= system.length
-        loose = system.exterior is not None
-        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=loose)
+        if system.loads is not None:
+            system.loads.add(state, self.force, self.hessian)
+        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=system.loose)
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
-        if held is not None or not system.invariant:
+        if system.loads is None and (held is not None or not system.invariant):
             # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
             modes = rigid_modes(system.cell, state)
             self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None

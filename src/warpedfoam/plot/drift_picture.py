@@ -1,0 +1,318 @@
+"""Pictures of a drift: frames with the energy against time, and animations."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpedfoam.arrays import Floats, as_instance, as_integer, as_number
+from warpedfoam.foam import Foam
+from warpedfoam.io.atomic import PathLike, as_path, atomic_binary, writable_path
+from warpedfoam.io.colours import bubble_colours
+from warpedfoam.io.patches import bubble_patches
+from warpedfoam.io.trajectory import Trajectory
+from warpedfoam.motion.result import Drift
+from warpedfoam.plot.foam_picture import _default_view, _paint, _pair, _resolution
+from warpedfoam.plot.projection import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Endings of animations, and the most frames of one.
+ENDINGS, MOST_FRAMES = (".gif", ".mp4"), 2000
+#: The view follows the bubbles if they look the same way to this degree, 1 for all alike.
+ALIKE = 0.3
+#: Room round the bubbles in a close view, as a share of them; whole surfaces are shown beyond this share of it.
+MARGIN, WHOLE = 0.15, 0.7
+#: Frames in the picture of a drift whose choice is left to it.
+SHOWN = 4
+
+Colours = NDArray[np.uint8]
+
+
+def plot_drift(
+    drift: Drift,
+    *,
+    frames: Sequence[int] | None = None,
+    color_by: str = "charge",
+    view: tuple[float, float] | None = None,
+    size: tuple[float, float] = (10.0, 6.4),
+    title: str | None = None,
+) -> Figure:
+    """Draw some frames of a drift over its energy against time; T1s are marked on the line.
+
+    Parameters
+    ----------
+    drift : Drift
+    frames : sequence of int, optional
+        Which frames, at most 8; by default four, evenly spread over the way that the bubbles go.
+    color_by : {"charge", "pressure", "sides", "area"}, optional
+    view : (float, float), optional
+        Elevation and azimuth in degrees; by default towards the bubbles, from all sides of a closed foam.
+    size : (float, float), optional
+        Width and height in inches.
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Not tied to pyplot: nothing to close.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If ``drift`` is not a Drift, a frame is not there, or an option is unknown.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    as_instance(drift, "drift", Drift)
+    chosen = _spread(drift) if frames is None else [int(k) for k in frames]
+    if not 1 <= len(chosen) <= 8:
+        raise ValueError(f"frames must name 1 to 8 frames, got {len(chosen)}")
+    last = len(drift.foams) - 1
+    for k in chosen:
+        as_integer(k, "frames", minimum=-last - 1, maximum=last)
+    shown = [drift.foams[k] for k in chosen]
+    stage = _Stage(drift.foams, view)
+    figure = Figure(figsize=_pair(size, "size"), layout="constrained")
+    FigureCanvasAgg(figure)
+    if title is not None:
+        figure.suptitle(title)
+    grid = figure.add_gridspec(2, len(shown), height_ratios=(1.5, 1.0))
+    for column, (k, foam) in enumerate(zip(chosen, shown, strict=True)):
+        axes = figure.add_subplot(grid[0, column])
+        stage.paint(axes, foam, color_by)
+        axes.set_title(f"t = {drift.times[k]:.4g}", fontsize=10)
+    axes = figure.add_subplot(grid[1, :])
+    _energy_axes(axes, drift)
+    axes.plot(drift.times[chosen], drift.energies[chosen], "o", color="0.15", ms=4, zorder=3)
+    return figure
+
+
+def animate(
+    trajectory: Drift | Trajectory | PathLike,
+    path: PathLike,
+    *,
+    color_by: str = "charge",
+    view: tuple[float, float] | None = None,
+    size: tuple[float, float] = (6.4, 6.0),
+    frames_per_second: float = 12.0,
+    dpi: int = 90,
+) -> Path:
+    """Write a drift as an animation: the foam over its energy against time.
+
+    Parameters
+    ----------
+    trajectory : Drift, Trajectory or path
+        Or any HDF5 trajectory of foams in one cell.
+    path : str or path
+        ``.gif``, or ``.mp4`` where the program ffmpeg is installed.
+    color_by, view, size
+        As in `plot_drift`.
+    frames_per_second : float, optional
+    dpi : int, optional
+
+    Returns
+    -------
+    pathlib.Path
+        The file written; it appears whole or not at all.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of the wrong type or out of range, or the file's ending is another one.
+    RuntimeError
+        If ``path`` ends in ``.mp4`` and there is no ffmpeg.
+    FileNotFoundError, IsADirectoryError, FileFormatError
+        If a file cannot be read or written.
+    """
+    target = writable_path(path, suffixes=ENDINGS)
+    rate = as_number(frames_per_second, "frames_per_second", minimum=0.1, maximum=100.0)
+    dots = as_integer(dpi, "dpi", minimum=20, maximum=600)
+    if target.suffix.lower() == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            raise RuntimeError(
+                f"cannot write {target}: MP4 needs the program ffmpeg, which is not installed; write a .gif"
+            )
+    if isinstance(trajectory, Drift):
+        foams, times, energies = list(trajectory.foams), trajectory.times, trajectory.energies
+    else:
+        opened = trajectory if isinstance(trajectory, Trajectory) else Trajectory(as_path(trajectory))
+        try:
+            foams, times = list(opened), opened.times
+        finally:
+            if opened is not trajectory:
+                opened.close()
+        energies = np.array([foam.energy for foam in foams])
+    if not 1 <= len(foams) <= MOST_FRAMES:
+        raise ValueError(f"trajectory must hold 1 to {MOST_FRAMES} frames, got {len(foams)}")
+    pictures = _pictures(foams, times, energies, color_by, view, _pair(size, "size"), dots)
+    if target.suffix.lower() == ".gif":
+        _write_gif(target, pictures, rate)
+    else:
+        _write_mp4(target, pictures, rate)
+    return target
+
+
+def _pictures(
+    foams: list[Foam],
+    times: Floats,
+    energies: Floats,
+    color_by: str,
+    view: tuple[float, float] | None,
+    size: tuple[float, float],
+    dots: int,
+) -> Iterator[Colours]:
+    """Frame after frame as (height, width, 3) bytes, both sides even."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    stage = _Stage(foams, view)
+    for foam, time, energy in zip(foams, times, energies, strict=True):
+        figure = Figure(figsize=size, dpi=dots, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        above, below = figure.subplots(2, 1, height_ratios=(3.0, 1.0))
+        stage.paint(above, foam, color_by)
+        above.set_title(f"t = {time:.4g}", fontsize=10)
+        below.plot(times, energies, color="0.6", lw=1.2)
+        below.plot([time], [energy], "o", color="#cc3d28", ms=5)
+        _label(below)
+        canvas.draw()
+        pixels = np.asarray(canvas.buffer_rgba())[:, :, :3]
+        yield pixels[: pixels.shape[0] // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
+
+
+def _write_gif(target: Path, pictures: Iterator[Colours], rate: float) -> None:
+    from PIL import Image
+
+    images = [Image.fromarray(p).quantize(colors=128, dither=Image.Dither.NONE) for p in pictures]
+    with atomic_binary(target) as stream:
+        images[0].save(
+            stream,
+            format="GIF",
+            save_all=True,
+            append_images=images[1:],
+            duration=max(10, round(1000.0 / rate)),
+            loop=0,
+        )
+
+
+def _write_mp4(target: Path, pictures: Iterator[Colours], rate: float) -> None:
+    import subprocess
+
+    first = next(pictures)
+    height, width = first.shape[:2]
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(6)}.mp4")
+    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+    command += ["-s", f"{width}x{height}", "-r", f"{rate:g}", "-i", "-", "-pix_fmt", "yuv420p"]
+    try:
+        with subprocess.Popen([*command, str(temporary)], stdin=subprocess.PIPE) as process:
+            assert process.stdin is not None
+            process.stdin.write(first.tobytes())
+            for picture in pictures:
+                process.stdin.write(picture.tobytes())
+            process.stdin.close()
+            if process.wait() != 0:
+                raise RuntimeError(f"cannot write {target}: ffmpeg ended with code {process.returncode}")
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+class _Stage:
+    """The same view and the same cut-out for all frames."""
+
+    def __init__(self, foams: Sequence[Foam], view: tuple[float, float] | None) -> None:
+        first = foams[0]
+        segments, rings = _resolution(first.n_bubbles)
+        self._segments, self._rings = segments, rings
+        patches = bubble_patches(first, curve_points=segments + 1, rings=rings)
+        if view is None:
+            elevation, azimuth = _towards(foams) or _default_view(first, patches)
+        else:
+            elevation, azimuth = _pair(view, "view")
+        self._view = View.from_angles(elevation, azimuth)
+        flat = self._view.project(patches.points)[:, :2]
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        whole = float((high - low).max())
+        self._box: tuple[Floats, Floats] | None = None
+        if first.exterior is not None:
+            curves = [self._view.project(foam.film_curves(8))[..., :2].reshape(-1, 2) for foam in foams]
+            places = np.concatenate(curves)
+            near, far = places.min(axis=0), places.max(axis=0)
+            half = (0.5 + MARGIN) * float((far - near).max())
+            if 2.0 * half < WHOLE * whole:
+                self._box = (0.5 * (near + far) - half, 0.5 * (near + far) + half)
+
+    def paint(self, axes: Axes, foam: Foam, color_by: str) -> None:
+        """Draw a foam, cut out like all others."""
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        patches = bubble_patches(foam, curve_points=self._segments + 1, rings=self._rings)
+        _paint(axes, foam, patches, bubble_colours(foam, color_by), self._view, self._segments, None)
+        if self._box is not None:
+            low, high = self._box
+            axes.set_xlim(low[0], high[0])
+            axes.set_ylim(low[1], high[1])
+
+
+def _towards(foams: Sequence[Foam]) -> tuple[float, float] | None:
+    """Elevation and azimuth of the bubbles' mean normal, if they have one: those of clusters."""
+    first = foams[0]
+    if first.exterior is None or first.cell.surface.period is not None:
+        return None
+    centres = np.concatenate([np.delete(foam.bubble_centres, first.exterior, axis=0) for foam in foams])
+    mean = first.cell.surface.normals(centres).mean(axis=0)
+    size = float(np.linalg.norm(mean))
+    if size < ALIKE:
+        return None
+    elevation = float(np.degrees(np.arcsin(np.clip(mean[2] / size, -1.0, 1.0))))
+    return elevation, float(np.degrees(np.arctan2(mean[1], mean[0])))
+
+
+def _spread(drift: Drift) -> list[int]:
+    """Frames evenly spread over the way that the bubbles go."""
+    count = len(drift.foams)
+    if count <= SHOWN:
+        return list(range(count))
+    moves = np.linalg.norm(np.diff(drift.centres, axis=0), axis=2).mean(axis=1)
+    way = np.concatenate([[0.0], np.cumsum(moves)])
+    if not way[-1] > 0.0:
+        return [0, count - 1]
+    wanted = np.linspace(0.0, way[-1], SHOWN)
+    found = {int(np.abs(way - w).argmin()) for w in wanted[:-1]}
+    return sorted({0, *found, count - 1})
+
+
+def _energy_axes(axes: Axes, drift: Drift) -> None:
+    axes.plot(drift.step_times, drift.step_energies, color="#2f78bd", lw=1.4)
+    if drift.events:
+        axes.plot(
+            [e.time for e in drift.events],
+            [e.energy_after for e in drift.events],
+            "|",
+            color="#cc3d28",
+            ms=12,
+            label="T1",
+        )
+        axes.legend(frameon=False)
+    _label(axes)
+
+
+def _label(axes: Any) -> None:
+    axes.set_xlabel("time")
+    axes.set_ylabel("energy")
+    axes.ticklabel_format(axis="y", useOffset=False)
+    axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
