@@ -123,7 +123,7 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
 def _head(foam: Foam, formulas: Formulas, model: str) -> Iterable[str]:
     rest, period = rest_of(foam), foam.cell.surface.period
     last = foam.bubble_ids[rest]
-    yield f"// {foam.n_bubbles} bubbles between curved plates {foam.cell.mean_gap!r} apart, written by warpedfoam"
+    yield f"// {foam.n_bubbles} bubbles between plates {foam.cell.mean_gap!r} apart, written by warpedfoam"
     yield f"// pressures are relative to bubble_{last}, whose volume follows from the others'"
     if model == "soapfilm":
         yield from ("soapfilm", "quadratic", "space_dimension 3", "integral_order_2D 10")

@@ -265,10 +265,12 @@ def _paint(
     view: View,
     segments: int,
     strokes: Strokes | None,
-    thin: float,
+    thin: float | None = None,
 ) -> None:
     """Triangles and film segments in one collection, farthest first."""
     from matplotlib.collections import PolyCollection
+
+    thin = _film_width(foam.n_bubbles) if thin is None else thin
 
     surface = foam.cell.surface
     corners = view.project(patches.points)[patches.triangles]
