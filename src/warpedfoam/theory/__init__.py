@@ -46,6 +46,8 @@ from warpedfoam.theory.gap import (
     curvature_energy_change,
     gap_energy_change,
     gap_to_curvature_ratio,
+    second_order_balance,
+    varying_gap_energy,
 )
 from warpedfoam.theory.second_order import (
     Coefficients,
@@ -87,6 +89,7 @@ __all__ = [
     "perimeter_series",
     "relative_gap",
     "relative_volume",
+    "second_order_balance",
     "second_order_coefficients",
     "second_order_energy",
     "second_order_pressure",
@@ -99,4 +102,5 @@ __all__ = [
     "torus_curvatures",
     "torus_gaussian_curvature",
     "validity_radius",
+    "varying_gap_energy",
 ]

@@ -70,3 +70,57 @@ def balancing_gap_change(volume: ArrayLike, gaussian_curvature: ArrayLike) -> Fl
     """
     v = as_values(volume, "volume", positive=True)
     return as_values(gaussian_curvature, "gaussian_curvature") * v / (3.0 * np.pi)
+
+
+def second_order_balance(volume: ArrayLike, gap: ArrayLike, gaussian_curvature: ArrayLike) -> Floats:
+    """δd = (¾ + πd³/4V) GV/(3π): `balancing_gap_change` for ruled films, consistent in the curvatures; length.
+
+    To second order in the curvatures E/E0 = 1 − G (ρ²/8 + d²/24) + …, not 1 − G ρ²/6; what is left out is
+    the twist of the films, −d² D²/24 with D half the difference of the principal curvatures, and
+    relative corrections of the order of the bubble's size over the radii of curvature, squared.
+
+    Examples
+    --------
+    >>> float((second_order_balance(0.5, 0.5, 0.0125) / balancing_gap_change(0.5, 0.0125)).round(5))
+    0.94635
+    """
+    v, d = as_values(volume, "volume", positive=True), as_values(gap, "gap", positive=True)
+    return (0.75 + 0.25 * np.pi * d**3 / v) * balancing_gap_change(v, gaussian_curvature)
+
+
+def varying_gap_energy(
+    volume: ArrayLike,
+    gap: ArrayLike,
+    slope: ArrayLike,
+    laplacian: ArrayLike = 0.0,
+    tension: ArrayLike = 1.0,
+) -> Floats:
+    """E = 2γ sqrt(πVd) [1 − ρ²|∇d|²/8d² + 3ρ²Δd/16d] of a bubble over a plane; energy.
+
+    d, |∇d| and Δd are those at the bubble's centre of volume and ρ² = V/πd; the next terms are of fourth
+    order in ρ over the length along which the gap changes. Derivation: docs/gaps.md.
+
+    Parameters
+    ----------
+    volume, gap : float or array
+    slope : float or array
+        |∇d|.
+    laplacian : float or array, optional
+        Δd.
+    tension : float or array, optional
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is not made of finite numbers in range.
+
+    Examples
+    --------
+    >>> float(varying_gap_energy(1.0, 1.0, slope=0.02).round(6))
+    3.544851
+    """
+    d = as_values(gap, "gap", positive=True)
+    rho2 = as_values(volume, "volume", positive=True) / (np.pi * d)
+    steep, bent = as_values(slope, "slope"), as_values(laplacian, "laplacian")
+    change = 0.1875 * rho2 * bent / d - 0.125 * rho2 * (steep / d) ** 2
+    return flat_energy(volume, gap, tension) * (1.0 + change)
