@@ -40,9 +40,9 @@ def main(folder: str | Path = "out", full: bool = False, duration: float = 2e5) 
         moved = wf.drift(start, friction=1.0, duration=duration, every=every, tolerance=tolerance)
         if not moved.completed:
             raise SystemExit(moved.message)
-        places = (
-            moved.centres[:, :-1] if name == "three bubbles" else moved.centres[:, :-1].mean(1, keepdims=True)
-        )
+        # the middle of the seven counts
+        places = moved.centres[:, :-1]
+        places = places.mean(axis=1, keepdims=True) if name == "seven" else places
         phi = np.degrees(TORUS.angles(places.reshape(-1, 3))[0]).reshape(len(moved.times), -1)
         print(f"{name}: {moved.n_steps} steps, energy {moved.energies[0]:.6f} to {moved.energies[-1]:.6f}")
         for k in range(0, len(moved.times), max(1, len(moved.times) // 4)):
