@@ -39,6 +39,7 @@ def test_every_example_is_tested() -> None:
         "05_polydispersity_ensemble",
         "06_scars_on_spheres",
         "07_bubble_on_a_torus",
+        "09_three_bubbles_drifting",
     }  # fmt: skip
     assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
@@ -129,3 +130,14 @@ def test_bubble_on_a_torus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert apart < 2e-6
     assert {p.name for p in tmp_path.iterdir()} == {"torus_energy.png", "torus_energy.csv"}
     assert len(capsys.readouterr().out.splitlines()) == 4
+
+
+def test_three_bubbles_drifting(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    farthest, rise = example("09_three_bubbles_drifting").main(tmp_path, duration=2e4)
+    # from 175 degrees on its way to 0; a fine run has 135.2
+    assert farthest == pytest.approx(135.2, abs=0.7)
+    assert rise < 1e-11
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "three_bubbles.png", "three_bubbles.csv", "seven.png", "seven.csv",
+    }  # fmt: skip
+    assert len(capsys.readouterr().out.splitlines()) == 12

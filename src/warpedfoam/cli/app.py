@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
 from warpedfoam.cli.flags import Debug, Folder, Json, Quiet, Seed
+from warpedfoam.cli.motion_verbs import motion_verbs
 from warpedfoam.cli.progress import progress_bars
 from warpedfoam.cli.verbs import verbs
 
@@ -43,6 +44,7 @@ foam_app = typer.Typer(
 )
 app.add_typer(foam_app, name="foam")
 app.add_typer(verbs)
+app.add_typer(motion_verbs)
 
 Count = Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of bubbles.")]
 Gap = Annotated[float, typer.Option("--gap", help="Distance between the plates.")]

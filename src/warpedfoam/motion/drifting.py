@@ -25,7 +25,9 @@ from warpedfoam.relax.system import State
 #: First step, in λ ℓ²/γ; a step below the second share of that is no step.
 FIRST, LEAST = 1e-3, 1e-10
 #: How steps grow and shrink: safety, least and greatest factor; factors after a failure and after a second.
-SAFETY, SHRINK, GROW, FAILED = 0.9, 0.2, 2.0, (0.4, 0.1)
+SAFETY, SHRINK, GROW, FAILED = 0.9, 0.2, 2.0, (0.5, 0.2)
+#: Steps stay below this share of one that failed, and that bound grows by this in every step.
+BELOW, LIFT = 0.8, 1.3
 #: A film below its cutoff may lose this share of its length in a step.
 LOSS = 0.5
 #: Sweeps that space markers after one step.
@@ -52,6 +54,7 @@ class _Run:
     state: State
     time: float = 0.0
     step: float = 0.0
+    bound: float = 1e300
     count: int = 0
     rejected: int = 0
     foams: list[Foam] = field(default_factory=list)
@@ -276,6 +279,7 @@ def _write_frame(run: _Run, writer: TrajectoryWriter, more: dict[str, Any]) -> N
     notes: dict[str, Any] = {
         **more,
         "step": run.step,
+        "bound": run.bound,
         "count": run.count,
         "rejected": run.rejected,
         "log": run.log[log:],
@@ -309,7 +313,7 @@ def _recall(run: _Run, path: Path) -> None:
         run.log += [(row[0], row[1], row[2], row[3]) for row in note["log"]]
         run.events += [_event(entry) for entry in note["events"]]
     last = kept[-1]
-    run.time, run.step = times[-1], last["step"]
+    run.time, run.step, run.bound = times[-1], last["step"], last["bound"]
     run.count, run.rejected = last["count"], last["rejected"]
     run.state = run.stepper.state_of(foams[-1])
     run.noted = (len(run.log), len(run.events))
@@ -382,6 +386,7 @@ def _step(run: _Run, target: float) -> None:
                 raise StepFailed("a film shrinks too fast")
         except StepFailed as fault:
             run.step = FAILED[bool(run.fault)] * time
+            run.bound = BELOW * time
             run.fault = str(fault)
             run.rejected += 1
             continue
@@ -395,7 +400,8 @@ def _step(run: _Run, target: float) -> None:
     run.fault = ""
     if options.step is None:
         factor = min(GROW, SAFETY / np.sqrt(max(worst, 1e-12)))
-        run.step = max(time * factor, run.step if time < run.step else 0.0)
+        run.bound = min(LIFT * run.bound, 1e300)
+        run.step = min(max(time * factor, run.step if time < run.step else 0.0), run.bound)
     else:
         run.step = options.step
     before, energy = run.state, run.log[-1][1]

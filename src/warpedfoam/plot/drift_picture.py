@@ -20,6 +20,7 @@ from warpedfoam.io.trajectory import Trajectory
 from warpedfoam.motion.result import Drift
 from warpedfoam.plot.foam_picture import _default_view, _paint, _pair, _resolution
 from warpedfoam.plot.projection import View
+from warpedfoam.surfaces import Sphere
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,9 +28,9 @@ if TYPE_CHECKING:
 
 #: Endings of animations, and the most frames of one.
 ENDINGS, MOST_FRAMES = (".gif", ".mp4"), 2000
-#: The view follows the bubbles if they look the same way to this degree, 1 for all alike.
-ALIKE = 0.3
-#: Room round the bubbles in a close view, as a share of them; whole surfaces are shown beyond this share of it.
+#: Directions that are tried for a view.
+DIRECTIONS = 4000
+#: Room round the bubbles in a close view, as a share of them; all is shown from a share of the whole on.
 MARGIN, WHOLE = 0.15, 0.7
 #: Frames in the picture of a drift whose choice is left to it.
 SHOWN = 4
@@ -55,7 +56,7 @@ def plot_drift(
         Which frames, at most 8; by default four, evenly spread over the way that the bubbles go.
     color_by : {"charge", "pressure", "sides", "area"}, optional
     view : (float, float), optional
-        Elevation and azimuth in degrees; by default towards the bubbles, from all sides of a closed foam.
+        Elevation and azimuth in degrees; by default from where the bubbles of clusters are seen best.
     size : (float, float), optional
         Width and height in inches.
     title : str, optional
@@ -180,7 +181,7 @@ def _pictures(
     stage = _Stage(foams, view)
     for foam, time, energy in zip(foams, times, energies, strict=True):
         figure = Figure(figsize=size, dpi=dots, layout="constrained")
-        canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
         above, below = figure.subplots(2, 1, height_ratios=(3.0, 1.0))
         stage.paint(above, foam, color_by)
         above.set_title(f"t = {time:.4g}", fontsize=10)
@@ -267,17 +268,21 @@ class _Stage:
 
 
 def _towards(foams: Sequence[Foam]) -> tuple[float, float] | None:
-    """Elevation and azimuth of the bubbles' mean normal, if they have one: those of clusters."""
+    """Elevation and azimuth from which the bubbles of clusters are seen best, in all frames; or None."""
     first = foams[0]
     if first.exterior is None or first.cell.surface.period is not None:
         return None
     centres = np.concatenate([np.delete(foam.bubble_centres, first.exterior, axis=0) for foam in foams])
-    mean = first.cell.surface.normals(centres).mean(axis=0)
-    size = float(np.linalg.norm(mean))
-    if size < ALIKE:
+    normals = first.cell.surface.normals(centres)
+    ways = Sphere(1.0).lattice_points(DIRECTIONS)
+    worst = (ways @ normals.T).min(axis=1)
+    if worst.max() <= 0.0:
         return None
-    elevation = float(np.degrees(np.arcsin(np.clip(mean[2] / size, -1.0, 1.0))))
-    return elevation, float(np.degrees(np.arctan2(mean[1], mean[0])))
+    # of equally good ones the middle
+    best = ways[worst >= worst.max() - 0.02].mean(axis=0)
+    best /= np.linalg.norm(best)
+    elevation = float(np.degrees(np.arcsin(np.clip(best[2], -1.0, 1.0))))
+    return elevation, float(np.degrees(np.arctan2(best[1], best[0])))
 
 
 def _spread(drift: Drift) -> list[int]:

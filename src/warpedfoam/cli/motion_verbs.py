@@ -1,0 +1,91 @@
+"""The command ``drift``; it hands its arguments to `warpedfoam.cli.drifting`."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, signals
+from warpedfoam.cli.flags import Debug, Folder, Json, Quiet
+from warpedfoam.cli.progress import progress_bars
+
+motion_verbs = typer.Typer()
+
+
+@motion_verbs.command()
+def drift(
+    file: Annotated[str, typer.Argument(help="A foam: NPZ, VTP or HDF5 of warpedfoam.", metavar="FOAM")],
+    duration: Annotated[float, typer.Option("--duration", help="Time to cover.")],
+    friction: Annotated[
+        float, typer.Option("--friction", help="Friction of the films, force per area and velocity.")
+    ] = 1.0,
+    yield_friction: Annotated[
+        float, typer.Option("--yield-friction", help="Force per area below which films stay where they are.")
+    ] = 0.0,
+    every: Annotated[
+        float | None, typer.Option("--every", help="Time between frames; a fiftieth if left out.")
+    ] = None,
+    hold_volumes: Annotated[
+        bool, typer.Option("--hold-volumes/--no-pressure", help="Or grain growth, without any pressure.")
+    ] = True,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Error of a time step, in bubble sizes.")
+    ] = 1e-3,
+    step: Annotated[
+        float | None, typer.Option("--step", help="A fixed time step in place of adaptive ones.")
+    ] = None,
+    order: Annotated[
+        int | None, typer.Option("--order", help="Polynomial order of the films; the foam's if left out.")
+    ] = None,
+    t1: Annotated[bool, typer.Option("--t1/--no-t1", help="Let films turn (T1) on the way.")] = True,
+    frame: Annotated[
+        int, typer.Option("--frame", help="Frame of a trajectory to start from; -1 is the last.")
+    ] = -1,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where an earlier run was stopped.")] = False,
+    out: Folder = "out",
+    picture: Annotated[
+        bool, typer.Option("--picture/--no-picture", help="Draw frames and the energy against time.")
+    ] = True,
+    animation: Annotated[bool, typer.Option("--animation", help="Write an animation too (GIF).")] = False,
+    color_by: Annotated[
+        str, typer.Option("--color-by", help="Colour by charge, pressure, sides or area.")
+    ] = "charge",
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Let a foam drift against friction: its films move, bubbles and clusters follow the curvature."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli import drifting as job
+
+        options = {
+            "friction": friction,
+            "duration": duration,
+            "every": every,
+            "yield_friction": yield_friction,
+            "hold_volumes": hold_volumes,
+            "tolerance": tolerance,
+            "step": step,
+            "order": order,
+            "t1": t1,
+        }
+        with progress_bars(quiet=quiet) as report:
+            facts = job.drift_file(
+                file,
+                frame=frame,
+                out=out,
+                options=options,
+                resume=resume,
+                picture=picture,
+                animation=animation,
+                color_by=color_by,
+                progress=report,
+            )
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(job.summary_text(facts), flush=True)
+    if not facts["completed"]:
+        raise typer.Exit(NOT_CONVERGED)
