@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 import warpedfoam as wf
 
 SIZES = (100, 150, 200, 300, 400, 500, 700, 1000, 1400, 2000)
-COOLING_STEPS, STEPS = 4000, 16
+COOLING_STEPS, STEPS = 6000, 8
 
 
 def scars_of(n: int, seed: int) -> dict[str, float]:
@@ -40,7 +40,6 @@ def scars_of(n: int, seed: int) -> dict[str, float]:
     report = wf.defects(found.foam)
     clusters = report.clusters
     one = (clusters.charge == 1) & (clusters.kind != "network")
-    scale = 1e6 * found.foam.bubble_size  # γ d ℓ
     return {
         "n": n,
         "seed": seed,
@@ -51,7 +50,7 @@ def scars_of(n: int, seed: int) -> dict[str, float]:
         "of these scars": int((clusters.kind == "scar").sum()),
         "per cluster": float(clusters.pairs[one].sum() / max(one.sum(), 1)),
         "length": found.energy * 1e6,
-        "gained by annealing": (found.start_energy - found.energy) * 1e6 / scale,
+        "gained by annealing": (found.start_energy - found.energy) * 1e6 / found.foam.bubble_size,
         "moves tried": int(found.history.tried.sum()),
         "moves taken": int(found.history.taken.sum()),
         "seconds": time.process_time() - began,

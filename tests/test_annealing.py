@@ -139,8 +139,9 @@ def test_interrupted_runs_end_the_same(start: wf.Foam, tmp_path: Path) -> None:
     # a run that has ended is only read
     same(whole, wf.anneal(start, **options, folder=tmp_path / "run", progress=stop))
     names = sorted(p.name for p in (tmp_path / "run").iterdir())
+    assert names[0] == ".lock"
     assert names[-1] == "anneal.json"
-    assert len(names) <= 3
+    assert len(names) <= 4
 
 
 def test_a_crash_between_foam_and_state_leaves_a_whole_state(
@@ -206,6 +207,24 @@ def test_a_killed_process_goes_on(start: wf.Foam, tmp_path: Path) -> None:
 def time_to_kill(run: Path) -> bool:
     path = run / "anneal.json"
     return path.exists() and len(checkpoints.json.loads(path.read_text())["state"]["rows"]) >= 3
+
+
+@pytest.mark.skipif(os.name == "nt", reason="locks are POSIX")
+def test_one_run_at_a_time_in_a_folder(start: wf.Foam, tmp_path: Path) -> None:
+    """Two runs in one folder would remove each other's foams."""
+
+    def second(_: str, __: float) -> None:
+        with pytest.raises(BlockingIOError, match="another run is writing"):
+            wf.anneal(start, steps=3, seed=1, folder=tmp_path)
+
+    first = wf.anneal(start, steps=3, seed=1, folder=tmp_path, progress=second)
+    same(first, wf.anneal(start, steps=3, seed=1, folder=tmp_path))
+
+    def other(_: str, __: float) -> None:
+        with pytest.raises(BlockingIOError, match="another run is writing"):
+            wf.minimal_partition(CELL.surface, 4, starts=1, hops=0, folder=tmp_path)
+
+    wf.minimal_partition(CELL.surface, 4, starts=1, hops=0, folder=tmp_path, progress=other)
 
 
 def test_a_folder_of_another_run_is_refused(start: wf.Foam, tmp_path: Path) -> None:

@@ -174,6 +174,11 @@ def test_the_command(tmp_path: Path) -> None:
     names = {p.name for p in tmp_path.iterdir()}
     assert names == {"partition.npz", "tries.csv", "partition.png", "partition.json", "state"}
     assert wf.load(tmp_path / "partition.npz").film_lengths.sum() == pytest.approx(KNOWN[6], abs=1e-9)
+    # another search is refused and leaves the folder as it was
+    refused = CliRunner().invoke(app, [*given, "--seed", "7", "-o", str(tmp_path)])
+    assert refused.exit_code == 2
+    assert "seed differs" in refused.output
+    assert (tmp_path / "partition.json").exists()
     # once more: read from the state
     again = CliRunner().invoke(app, [*given, "-o", str(tmp_path), "--no-picture"])
     assert "reached by 2 of 2 starts" in again.stdout

@@ -43,11 +43,12 @@ def search(
     """
     chosen = _surface(surface, sizes)
     folder = output_folder(out)
-    (folder / RECORD).unlink(missing_ok=True)
     built = chosen.build()
     found = minimal_partition(
         built, n, seed=seed, starts=starts, hops=hops, folder=folder / STATE, progress=progress
     )
+    # the record is written last: a folder that has one holds the outputs of one search
+    (folder / RECORD).unlink(missing_ok=True)
     save(folder / FOAM, found.foam)
     tries = found.tries
     write_columns_csv(

@@ -23,7 +23,7 @@ from warpedfoam.errors import ConvergenceError
 from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.io.atomic import PathLike
 from warpedfoam.relax import Relaxation, relax
-from warpedfoam.studies.checkpoint import Checkpoint, fingerprint
+from warpedfoam.studies.checkpoint import fingerprint, kept
 from warpedfoam.studies.foam_moves import MOVES, moved
 from warpedfoam.studies.many_moves import many_moves
 
@@ -157,6 +157,8 @@ def anneal(
     ------
     TypeError, ValueError
         If an argument is of the wrong type or out of range, or ``folder`` holds another run.
+    OSError
+        If the folder cannot be written, or another run is writing there.
     ConvergenceError
         If the start does not relax.
 
@@ -179,37 +181,35 @@ def anneal(
     start_seed = as_integer(seed, "seed", minimum=0)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
-    checkpoint = None
-    if folder is not None:
-        key = {
-            "start": fingerprint(foam),
-            "steps": count,
-            "moves": list(kinds),
-            "sites": at_once,
-            "temperature": heat,
-            "cooling": ratio,
-            "width": spread,
-            "order": p,
-            "seed": start_seed,
-        }
-        checkpoint = Checkpoint(folder, "anneal", key)
-    found = None if checkpoint is None else checkpoint.read()
-    if found is None:
-        walk = _started(foam, p)
-        if checkpoint is not None:
-            checkpoint.write(walk.state(), walk.foams())
-    else:
-        walk = _Walk(found[1]["now"], found[1]["best"], found[0]["start_energy"], found[0]["rows"])
+    key = {
+        "start": "" if folder is None else fingerprint(foam),
+        "steps": count,
+        "moves": list(kinds),
+        "sites": at_once,
+        "temperature": heat,
+        "cooling": ratio,
+        "width": spread,
+        "order": p,
+        "seed": start_seed,
+    }
     unit = energy_unit(foam)
-    for k in range(len(walk.rows), count):
-        cooled = ratio ** (k / max(count - 1, 1))
-        rng = np.random.default_rng([start_seed, k])
-        move = kinds[int(rng.integers(len(kinds)))]
-        walk.step(move, rng, heat * cooled, unit, spread * float(np.sqrt(cooled)), p, at_once)
-        if checkpoint is not None:
-            checkpoint.write(walk.state(), walk.foams())
-        if progress is not None:
-            progress("anneal", (k + 1) / count)
+    with kept(folder, "anneal", key) as checkpoint:
+        found = None if checkpoint is None else checkpoint.read()
+        if found is None:
+            walk = _started(foam, p)
+            if checkpoint is not None:
+                checkpoint.write(walk.state(), walk.foams())
+        else:
+            walk = _Walk(found[1]["now"], found[1]["best"], found[0]["start_energy"], found[0]["rows"])
+        for k in range(len(walk.rows), count):
+            cooled = ratio ** (k / max(count - 1, 1))
+            rng = np.random.default_rng([start_seed, k])
+            move = kinds[int(rng.integers(len(kinds)))]
+            walk.step(move, rng, heat * cooled, unit, spread * float(np.sqrt(cooled)), p, at_once)
+            if checkpoint is not None:
+                checkpoint.write(walk.state(), walk.foams())
+            if progress is not None:
+                progress("anneal", (k + 1) / count)
     return Annealing(
         walk.best, walk.best.energy, walk.start_energy, walk.now, _history(walk.rows), start_seed
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io import load, save, write_record
 from warpedfoam.io.atomic import PathLike, as_path
+from warpedfoam.studies.lock import locked
 from warpedfoam.surfaces.protocol import Surface
 
 VERSION = 1
@@ -113,6 +115,25 @@ class Checkpoint:
         for path in self._folder.glob(f"{self._kind}-[0-9][0-9][0-9][0-9][0-9][0-9].npz"):
             if path.name not in kept:
                 path.unlink(missing_ok=True)
+
+
+@contextmanager
+def kept(folder: PathLike | None, kind: str, key: Mapping[str, Any]) -> Iterator[Checkpoint | None]:
+    """The folder's checkpoint, for one run at a time; None if there is no folder.
+
+    Raises
+    ------
+    NotADirectoryError
+        If ``folder`` is a file.
+    BlockingIOError
+        If another run is writing there.
+    """
+    if folder is None:
+        yield None
+        return
+    checkpoint = Checkpoint(folder, kind, key)
+    with locked(checkpoint.path.parent):
+        yield checkpoint
 
 
 def fingerprint(foam: Foam) -> str:

@@ -15,9 +15,10 @@ from typing import Any
 
 from warpedfoam.errors import FileFormatError
 from warpedfoam.io.atomic import atomic_binary, named
+from warpedfoam.studies.lock import locked
 from warpedfoam.studies.member import Outcome, environment_name
 
-JOURNAL, STATES, LOCK = "runs.jsonl", "states", ".lock"
+JOURNAL, STATES = "runs.jsonl", "states"
 
 
 class Journal:
@@ -114,27 +115,9 @@ def opened(folder: Path) -> Iterator[Journal]:
     FileFormatError
         If a line other than the last is damaged.
     """
-    with _locked(folder / LOCK):
+    with locked(folder):
         journal = Journal(folder)
         try:
             yield journal
         finally:
             journal.close()
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Hold a lock that the system lets go when the process ends, however it ends."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: two runs in one folder are not told apart there
-        yield
-        return
-    with open(path, "ab") as stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise BlockingIOError(
-                f"another run is writing to {path.parent}; wait for it or choose another folder"
-            ) from None
-        yield

@@ -18,6 +18,8 @@ from warpedfoam.surfaces.places import Places
 
 #: Least distance of two moves, in bubble sizes: each is alone in a patch of about thirty bubbles.
 APART = 6.0
+#: By how much, in γ d ℓ, a region may rise before its move is dropped, round by round before the last.
+SLACKS = (0.05, 0.01)
 #: Change of a region's energy, in γ d ℓ, below which nothing has happened there.
 NOTHING = 1e-6
 
@@ -35,7 +37,7 @@ class ManyMoves:
     tried, taken : int
         Numbers of moves.
     allowance : float
-        Σ −T ln u of the moves that were taken, in units of energy: what the rise is measured against.
+        Σ −T ln u_s of the moves that were taken, in units of energy: what the rise is measured against.
     """
 
     result: Relaxation | None
@@ -48,12 +50,13 @@ class ManyMoves:
 def many_moves(
     foam: Foam, move: str, rng: np.random.Generator, most: int, heat: float, unit: float, order: int
 ) -> ManyMoves:
-    """Make up to ``most`` moves at once, then once more those alone that lowered their regions' energies.
+    """Make up to ``most`` moves at once, then those again that did not raise their regions' energies.
 
     Films belong to the region of the move nearest to them, so the changes of the regions add up to the whole
-    change. A move s is taken if its region's change is at most −T ln u_s, u_s uniform in (0, 1).
-    A region's change holds the work that its neighbours do on its rim, so the foam with the moves taken
-    is relaxed again and its energy is the true one. If all moves together are lower still, these are taken.
+    change. A move s is kept if its region's change is at most −T ln u_s, u_s uniform in (0, 1). But the
+    elastic fields of bad moves reach into the regions of good ones. So moves are dropped in rounds,
+    those first that raise their region's energy by far, and the foam with the others is relaxed anew. The
+    lowest of these foams is the result; its energy is the true one.
 
     Parameters
     ----------
@@ -73,23 +76,25 @@ def many_moves(
     limits = -heat * unit * np.log(1.0 - rng.random(len(plans)))
     if not plans:
         return ManyMoves(None, None, 0, 0, 0.0)
-    trial = relaxed_or_none(made(foam, plans), order)
-    if trial is None or not trial.converged:
-        return ManyMoves(None, None, len(plans), 0, 0.0)
-    change = region_changes(foam, trial.foam, places)
-    moved = np.abs(change) > NOTHING * unit
-    good = moved & (change <= limits)
-    rise = trial.energy - foam.energy
-    everything = ManyMoves(trial, rise, len(plans), int(moved.sum()), float(limits[moved].sum()))
-    if not good.any():
-        return ManyMoves(None, rise, len(plans), 0, 0.0)
-    if (good | ~moved).all():
-        return everything
-    again = relaxed_or_none(made(foam, [plans[i] for i in np.flatnonzero(good)]), order)
-    if again is None or not again.converged or again.energy > trial.energy:
-        # regions that lean on each other: all moves together may be better than those that look good
-        return everything
-    return ManyMoves(again, rise, len(plans), int(good.sum()), float(limits[good].sum()))
+    chosen: Ints = np.arange(len(plans))
+    rise: float | None = None
+    best: ManyMoves | None = None
+    for slack in (*SLACKS, 0.0):
+        trial = relaxed_or_none(made(foam, [plans[i] for i in chosen]), order)
+        if trial is None or not trial.converged:
+            break
+        change = region_changes(foam, trial.foam, places)[chosen]
+        moved = np.abs(change) > NOTHING * unit
+        if rise is None:
+            rise = trial.energy - foam.energy
+        if moved.any() and (best is None or best.result is None or trial.energy < best.result.energy):
+            limit = float(limits[chosen[moved]].sum())
+            best = ManyMoves(trial, rise, len(plans), int(moved.sum()), limit)
+        good = moved & (change <= limits[chosen] + slack * unit)
+        if not good.any() or (good | ~moved).all():
+            break
+        chosen = chosen[good]
+    return best or ManyMoves(None, rise, len(plans), 0, 0.0)
 
 
 def region_changes(before: Foam, after: Foam, places: Floats) -> Floats:

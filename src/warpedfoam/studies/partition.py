@@ -14,7 +14,7 @@ from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.io.atomic import PathLike
 from warpedfoam.relax import Relaxation, relax
 from warpedfoam.studies.annealing import SAME, energy_unit
-from warpedfoam.studies.checkpoint import Checkpoint, surface_mark
+from warpedfoam.studies.checkpoint import kept, surface_mark
 from warpedfoam.studies.foam_moves import STEPS, moved
 from warpedfoam.studies.partition_starts import start_foam, start_kind
 from warpedfoam.surfaces.protocol import Surface
@@ -145,6 +145,8 @@ def minimal_partition(
     ------
     TypeError, ValueError
         If an argument is of the wrong type or out of range, or ``folder`` holds another search.
+    OSError
+        If the folder cannot be written, or another run is writing there.
     ResolutionError
         If no start could be built: there are too few bubbles for the surface.
     ConvergenceError
@@ -178,34 +180,33 @@ def minimal_partition(
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     cell = HeleShawCell(surface, THIN * surface.size)
-    checkpoint = None
-    if folder is not None:
-        key = {
-            "surface": surface_mark(surface),
-            "n": count,
-            "seed": number,
-            "hops": each,
-            "temperature": heat,
-        }
-        checkpoint = Checkpoint(folder, "partition", {**key, "order": p})
+    key = {
+        "surface": "" if folder is None else surface_mark(surface),
+        "n": count,
+        "seed": number,
+        "hops": each,
+        "temperature": heat,
+        "order": p,
+    }
     tries: list[PartitionTry] = []
     best: Foam | None = None
-    before = None if checkpoint is None else checkpoint.read()
-    if before is not None:
-        tries = [PartitionTry(**row) for row in before[0]["tries"]]
-        best = before[1].get("best")
-    for k in range(len(tries), tried):
-        made, foam = _tried(cell, count, k, np.random.default_rng([number, k]), each, heat, p)
-        lengths = [t.length for t in tries if t.length is not None]
-        # a tie goes to the earlier start
-        if made.length is not None and made.length < min(lengths, default=np.inf) * (1.0 - 1e-11):
-            best = foam
-        tries.append(made)
-        if checkpoint is not None:
-            state = {"tries": [asdict(t) for t in tries]}
-            checkpoint.write(state, {} if best is None else {"best": best})
-        if progress is not None:
-            progress("partition", (k + 1) / tried)
+    with kept(folder, "partition", key) as checkpoint:
+        before = None if checkpoint is None else checkpoint.read()
+        if before is not None:
+            tries = [PartitionTry(**row) for row in before[0]["tries"]]
+            best = before[1].get("best")
+        for k in range(len(tries), tried):
+            made, foam = _tried(cell, count, k, np.random.default_rng([number, k]), each, heat, p)
+            lengths = [t.length for t in tries if t.length is not None]
+            # a tie goes to the earlier start
+            if made.length is not None and made.length < min(lengths, default=np.inf) * (1.0 - 1e-11):
+                best = foam
+            tries.append(made)
+            if checkpoint is not None:
+                state = {"tries": [asdict(t) for t in tries]}
+                checkpoint.write(state, {} if best is None else {"best": best})
+            if progress is not None:
+                progress("partition", (k + 1) / tried)
     if best is None:
         kind = ResolutionError if all(t.first_length is None for t in tries) else ConvergenceError
         raise kind(f"none of the {len(tries)} starts led to a foam; the last one: {tries[-1].message}")
