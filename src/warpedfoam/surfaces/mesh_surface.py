@@ -148,8 +148,8 @@ class MeshSurface(LevelSurface):
         Raises
         ------
         FileNotFoundError, MeshError
-            See `read_mesh`; also if the mesh is one that `MeshSurface` refuses. ``warpedfoam check FILE`` tells
-            all that is wrong with it and mends some of it.
+            See `read_mesh`; also if the mesh is one that `MeshSurface` refuses. ``warpedfoam check FILE``
+            tells all that is wrong with it and mends some of it.
         """
         mesh = read_mesh(path)
         try:
