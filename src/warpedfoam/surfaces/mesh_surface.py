@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from os import PathLike
+from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -148,10 +148,16 @@ class MeshSurface(LevelSurface):
         Raises
         ------
         FileNotFoundError, MeshError
-            See `read_mesh`; also if the mesh is one that `MeshSurface` refuses.
+            See `read_mesh`; also if the mesh is one that `MeshSurface` refuses. ``warpedfoam check FILE``
+            tells all that is wrong with it and mends some of it.
         """
         mesh = read_mesh(path)
-        return cls(mesh.nodes, mesh.triangles)
+        try:
+            return cls(mesh.nodes, mesh.triangles)
+        except MeshError as fault:
+            name = fspath(path)
+            advice = f"see all of it, and mend it, with: warpedfoam check {name} --repair mended.ply"
+            raise MeshError(f"{name}: {fault}; {advice}") from fault
 
     def rim_loops(self) -> Sequence[Sequence[Floats]]:
         """The mesh's rim on the smooth surface, cut into sides at its corners."""
