@@ -17,7 +17,10 @@ from typing import Any
 
 import numpy as np
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
+NAMES = (
+    "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome", "google-chrome-stable",
+    "chrome", "microsoft-edge",
+)  # fmt: skip
 FLAGS = [
     "--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--hide-scrollbars", "--no-first-run", "--disable-quic",
@@ -36,10 +39,25 @@ os.execv(sys.argv[3], sys.argv[3:])
 PATIENCE = 90.0
 
 
+#: Names a file that appears once a browser has been installed, or could not be.
+COMING = "WARPEDFOAM_BROWSER_COMING"
+#: What graphics drivers say of reading one pixel, which is how the page finds the bubble under a finger.
+IDLE = "GPU stall due to ReadPixels"
+
+
 def browser_path() -> str | None:
     """Where a Chromium is: the variable WARPEDFOAM_BROWSER, or one of the usual names."""
     named = os.environ.get("WARPEDFOAM_BROWSER")
     return named or next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+def awaited_browser() -> str | None:
+    """As `browser_path`, once an installation that goes on beside the tests has ended."""
+    end = time.monotonic() + PATIENCE
+    coming = os.environ.get(COMING)
+    while coming and not Path(coming).exists() and time.monotonic() < end:
+        time.sleep(0.5)
+    return browser_path()
 
 
 class Browser:
@@ -126,7 +144,8 @@ class Browser:
         elif method == "Network.requestWillBeSent":
             self.requests.append(params["request"]["url"])
         elif method == "Log.entryAdded":
-            self.complaints.append(params["entry"]["text"])
+            if IDLE not in params["entry"]["text"]:
+                self.complaints.append(params["entry"]["text"])
         elif method == "Runtime.exceptionThrown":
             details = params["exceptionDetails"]
             self.complaints.append(details.get("exception", {}).get("description", details["text"]))

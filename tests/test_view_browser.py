@@ -9,11 +9,10 @@ import pytest
 
 import warpedfoam as wf
 
-from .browser import Browser, browser_path
+from .browser import Browser, awaited_browser
 from .io_foams import bubble_on_torus, sphere_foam, torus_foam, with_pressures
 from .test_view import repeating, rimmed
 
-pytestmark = pytest.mark.skipif(browser_path() is None, reason="needs Chromium")
 WHITE = np.array([255, 255, 255])
 ACCENT = np.array([0xD4, 0x00, 0x9F])
 CANVAS = "document.getElementById('scene').getBoundingClientRect().toJSON()"
@@ -21,6 +20,8 @@ CANVAS = "document.getElementById('scene').getBoundingClientRect().toJSON()"
 
 @pytest.fixture(scope="module")
 def running():
+    if awaited_browser() is None:
+        pytest.skip("needs Chromium")
     browser = Browser()
     yield browser
     browser.close()
@@ -29,7 +30,7 @@ def running():
 @pytest.fixture
 def browser(running):
     """A window of a desktop in the light; the page must not have complained, nor asked for anything."""
-    running.window(900, 600)
+    running.window(740, 420)
     running.dark(False)
     yield running
     assert running.complaints == []
@@ -170,6 +171,7 @@ def test_what_is_no_disk_lies_under_its_bubbles(browser, tmp_path):
 
 def test_backs_are_paler(browser, tmp_path):
     """A dome from below: its inside, with less colour than its outside."""
+    browser.window(900, 600)
     foam = rimmed()
     shown(browser, tmp_path, foam)
 
