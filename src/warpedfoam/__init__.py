@@ -28,6 +28,8 @@ from warpedfoam.analysis import (
     charge_energies,
     charge_in,
     charge_profile,
+    cluster_charges,
+    cluster_labels,
     correlations,
     defects,
     equilibrium_report,
@@ -70,7 +72,7 @@ from warpedfoam.io import (
     write_vtm,
     write_vtp,
 )
-from warpedfoam.moves import T1Event, t1, wall_t1
+from warpedfoam.moves import ContactEvent, T1Event, add_markers, join, part, remove_markers, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import (
     plot_charge_energies,
@@ -84,7 +86,7 @@ from warpedfoam.plot import (
     save_figure,
     save_picture,
 )
-from warpedfoam.relax import LayeredRelaxation, Relaxation, relax
+from warpedfoam.relax import LayeredRelaxation, Relaxation, outline_gap, relax, with_contacts
 from warpedfoam.studies import (
     Annealing,
     AnnealingHistory,
@@ -150,6 +152,7 @@ __all__ = [
     "ChargeEnergies",
     "ChargeProfile",
     "ClusterPotential",
+    "ContactEvent",
     "ConvergenceError",
     "Correlations",
     "Cylinder",
@@ -192,14 +195,17 @@ __all__ = [
     "TrajectoryWriter",
     "TriangleMesh",
     "WarpedFoamError",
+    "add_markers",
     "anneal",
     "bond_order",
     "bubble_between_plates",
     "charge_energies",
     "charge_in",
     "charge_profile",
+    "cluster_charges",
     "cluster_clearance",
     "cluster_foam",
+    "cluster_labels",
     "cluster_potential",
     "correlations",
     "defects",
@@ -211,10 +217,13 @@ __all__ = [
     "geodesic_report",
     "geometric_potential",
     "import_polygons",
+    "join",
     "load",
     "mesh_report",
     "minimal_partition",
     "network_from_loops",
+    "outline_gap",
+    "part",
     "plot_charge_energies",
     "plot_charge_profile",
     "plot_correlations",
@@ -229,6 +238,7 @@ __all__ = [
     "read_study",
     "read_vtp",
     "relax",
+    "remove_markers",
     "run_ensemble",
     "save",
     "save_figure",
@@ -239,6 +249,7 @@ __all__ = [
     "thomson_points",
     "voronoi_foam",
     "wall_t1",
+    "with_contacts",
     "write_bubbles_csv",
     "write_bubbles_parquet",
     "write_columns_csv",
