@@ -92,7 +92,7 @@ def test_torque_is_minus_the_slope(n: int) -> None:
 
 def test_a_free_orientation_has_no_torque_and_less_energy() -> None:
     at = on_torus([1.2])
-    free = wf.cluster_potential(CELL, 2, volumes=0.5, points=at, orientation=0.3)
+    free = wf.cluster_potential(CELL, 2, volumes=0.5, points=at, orientation=1.3)
     assert abs(free.torques[0]) < 1e-8
     assert free.minima[0]
     held = wf.cluster_potential(

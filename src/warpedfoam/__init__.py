@@ -28,6 +28,8 @@ from warpedfoam.analysis import (
     charge_energies,
     charge_in,
     charge_profile,
+    cluster_charges,
+    cluster_labels,
     correlations,
     defects,
     equilibrium_report,
@@ -71,7 +73,7 @@ from warpedfoam.io import (
     write_vtp,
 )
 from warpedfoam.motion import Drift, DriftEvent, drift, resume_drift
-from warpedfoam.moves import T1Event, t1, wall_t1
+from warpedfoam.moves import ContactEvent, T1Event, add_markers, join, part, remove_markers, t1, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import (
     animate,
@@ -92,7 +94,14 @@ from warpedfoam.plot import (
     save_figure,
     save_picture,
 )
-from warpedfoam.relax import LayeredRelaxation, Relaxation, RelaxationHistory, relax
+from warpedfoam.relax import (
+    LayeredRelaxation,
+    Relaxation,
+    RelaxationHistory,
+    outline_gap,
+    relax,
+    with_contacts,
+)
 from warpedfoam.studies import (
     Annealing,
     AnnealingHistory,
@@ -164,6 +173,7 @@ __all__ = [
     "ChargeEnergies",
     "ChargeProfile",
     "ClusterPotential",
+    "ContactEvent",
     "ConvergenceError",
     "Correlations",
     "Cylinder",
@@ -214,6 +224,7 @@ __all__ = [
     "TrajectoryWriter",
     "TriangleMesh",
     "WarpedFoamError",
+    "add_markers",
     "animate",
     "anneal",
     "anneal_points",
@@ -222,8 +233,10 @@ __all__ = [
     "charge_energies",
     "charge_in",
     "charge_profile",
+    "cluster_charges",
     "cluster_clearance",
     "cluster_foam",
+    "cluster_labels",
     "cluster_potential",
     "correlations",
     "defects",
@@ -236,10 +249,13 @@ __all__ = [
     "geodesic_report",
     "geometric_potential",
     "import_polygons",
+    "join",
     "load",
     "mesh_report",
     "minimal_partition",
     "network_from_loops",
+    "outline_gap",
+    "part",
     "plot_annealing",
     "plot_charge_energies",
     "plot_charge_profile",
@@ -260,6 +276,7 @@ __all__ = [
     "read_study",
     "read_vtp",
     "relax",
+    "remove_markers",
     "resume_drift",
     "run_ensemble",
     "save",
@@ -271,6 +288,7 @@ __all__ = [
     "thomson_points",
     "voronoi_foam",
     "wall_t1",
+    "with_contacts",
     "write_bubbles_csv",
     "write_bubbles_parquet",
     "write_columns_csv",

@@ -8,6 +8,7 @@ from warpedfoam.analysis.charge_curvature import (
     charge_in,
     charge_profile,
 )
+from warpedfoam.analysis.clusters import cluster_charges, cluster_labels
 from warpedfoam.analysis.correlations import Correlations, correlations, excess_charges
 from warpedfoam.analysis.defect_report import KINDS, DefectReport
 from warpedfoam.analysis.defects import defects
@@ -34,6 +35,8 @@ __all__ = [
     "charge_energies",
     "charge_in",
     "charge_profile",
+    "cluster_charges",
+    "cluster_labels",
     "correlations",
     "defects",
     "equilibrium_report",

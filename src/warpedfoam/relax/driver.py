@@ -5,17 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from warpedfoam.arrays import as_flag, as_integer, as_number, frozen
+from warpedfoam.errors import TopologyError
 from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.kernels.condense import Condensed
+from warpedfoam.moves.join import ContactEvent
+from warpedfoam.moves.markers import Layout
 from warpedfoam.moves.t1 import T1Event
+from warpedfoam.relax.contacts import MOST, make_contacts, restrained, waiting
 from warpedfoam.relax.held import moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.layered import relax_layers, require_lines
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
+from warpedfoam.relax.marking import with_markers
 from warpedfoam.relax.result import Relaxation, RelaxationHistory
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
 from warpedfoam.relax.system import (
@@ -46,6 +52,8 @@ LEAST_STEP = 0.01
 DRAFT = 0.03
 #: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
 SADDLE, KICK = 1e-6, 0.05
+#: Least share of exact steps that go to and fro.
+LEAST_DAMPING = 1.0 / 16.0
 SLIPPED = (
     "stopped: the volumes no longer add up, so a film has slipped round the surface or a bubble has turned "
     "inside out; use more bubbles, volumes that differ less, or more marker vertices"
@@ -64,12 +72,29 @@ class _Run:
     t1: bool
     turns: np.ndarray
     pins: np.ndarray
+    meet: bool
     iteration: int = 0
     events: list[T1Event] = field(default_factory=list)
     rows: list[tuple[int, float, float, float, int, bool]] = field(default_factory=list)
+    contacts: list[ContactEvent] = field(default_factory=list)
     is_minimum: bool = False
     fault: str = ""
+    refused: str = ""
     share: float = 1.0
+    past: float = np.inf
+    last: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    damping: float = 1.0
+
+    def snapshot(self) -> tuple[object, ...]:
+        """What `restore` brings back."""
+        kept = self.system, self.state, self.foam, self.turns.copy(), self.pins
+        return *kept, len(self.events), len(self.contacts)
+
+    def restore(self, kept: tuple[Any, ...]) -> None:
+        """Go back to a snapshot; the iterations stay counted."""
+        self.system, self.state, self.foam, self.turns, self.pins, n_events, n_contacts = kept
+        del self.events[n_events:]
+        del self.contacts[n_contacts:]
 
 
 def relax(
@@ -78,6 +103,7 @@ def relax(
     order: int | None = None,
     layers: int = 1,
     t1: bool = True,
+    contacts: bool = True,
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
     solver: str = "auto",
@@ -103,6 +129,10 @@ def relax(
     t1 : bool, optional
         Whether films may turn. Without T1s a film that wants to vanish keeps the foam from
         converging, which is reported.
+    contacts : bool, optional
+        Whether open clusters that meet are joined and bubbles that let go are parted between the steps
+        (`with_contacts`), and markers put where outlines need them. Without it films that cross are not
+        seen.
     tolerance : float, optional
         Of the residual, in γ d, 1e-13 … 1e-3. Volumes are held to a hundredth of it or to 1e-12,
         whichever is larger, relative (bubbles below a tenth of the mean: relative to that).
@@ -132,7 +162,7 @@ def relax(
     """
     if not isinstance(foam, Foam):
         raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")
-    with_t1 = as_flag(t1, "t1")
+    with_t1, meet = as_flag(t1, "t1"), as_flag(contacts, "contacts")
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     tol = as_number(tolerance, "tolerance", minimum=1e-13, maximum=1e-3)
@@ -157,18 +187,20 @@ def relax(
         with_t1,
         np.zeros(start.network.n_films, dtype=np.int64),
         pinned_unknowns(foam.cell, state),
+        meet and foam.exterior is not None,
     )
+    first = run.snapshot()
     residuals, converged = _iterate(run, tol, limit, progress)
     clock.lap("total")
     if run.fault and not _adds_up(run):
         # what cannot be told apart from a slipped film is not handed out
-        run.state = state
-        run.events.clear()
+        run.restore(first)
     state = run.state
+    scale = foam.tension * run.system.film_unit / run.system.mean_volume
     zero = state.pressures.mean() if foam.exterior is None else state.pressures[foam.exterior]
     pressures = frozen((state.pressures - zero) * scale)
     final = replace(
-        start,
+        run.foam,
         network=state.network,
         vertex_points=state.points,
         film_offsets=state.offsets,
@@ -187,6 +219,7 @@ def relax(
         history=_history(run.rows),
         timings=MappingProxyType(dict(system.timings)),
         message=_message(converged, residuals, run, tol, limit),
+        contacts=tuple(run.contacts),
     )
     if across == 1:
         return ruled
@@ -204,7 +237,7 @@ def _iterate(
     run: _Run, tolerance: float, limit: int, progress: Callable[[str, float], None] | None
 ) -> tuple[Residuals, bool]:
     exact = False
-    sound = (run.state, len(run.events), run.turns.copy())
+    sound = run.snapshot()
     while True:
         lin = run.system.linearise(run.state, draft=not exact)
         now = lin.residuals
@@ -216,8 +249,7 @@ def _iterate(
         done = now.force <= tolerance and held <= max(0.01 * tolerance, 1e-12)
         slipped = lin.slip > (DRAFT if lin.draft else run.foam.cell.surface.precision)
         if slipped or not np.isfinite(now.force):
-            run.state, kept, run.turns = sound
-            del run.events[kept:]
+            run.restore(sound)
             run.share *= 0.5
             hopeless = run.share < LEAST_STEP or run.iteration >= limit or run.state is lin.state
             if not hopeless:
@@ -228,7 +260,7 @@ def _iterate(
                 run.fault = SLIPPED if slipped else DEGENERATE
                 return now, False
         else:
-            sound = (run.state, len(run.events), run.turns.copy())
+            sound = run.snapshot()
             run.share = min(1.0, 1.5 * run.share)
         if lin.draft and (done or run.iteration >= limit):
             exact = True
@@ -238,7 +270,9 @@ def _iterate(
             run.is_minimum = _is_minimum(lin, _kkt(run, lin, condensed, LEAST_SHIFT), condensed)
             if run.is_minimum or run.iteration >= limit:
                 _note(run, lin, exact)
-                return now, done and run.is_minimum
+                if run.refused:
+                    run.fault = f"stopped: outlines have met, and {run.refused}"
+                return now, done and run.is_minimum and not run.refused
         error = float(np.abs(now.volume / run.system.shares).max())
         if not exact:
             exact = now.force < EXACT_BELOW and error < EXACT_BELOW
@@ -252,6 +286,9 @@ def _iterate(
                 _proximal_step(run, lin)
         except SingularMatrixError:
             run.fault = SINGULAR
+            return now, False
+        except TopologyError as error:
+            run.fault = f"stopped: outlines have met, and {error}"
             return now, False
         run.iteration += 1
 
@@ -300,6 +337,8 @@ def _advance(run: _Run, step: Step) -> None:
     """Apply a step film by film limited, then turn and realign films."""
     clock = Stopwatch(run.system.timings)
     cell, length = run.system.cell, run.system.length
+    if run.meet:
+        step = _restrained(run, step)
     sweep = plan_sweep(cell, run.state, step, length, run.turns, run.system.shares, t1=run.t1)
     limited = Step(step.vertices * sweep.limit[:, None], step.offsets, step.pressures)
     state = _moved(run, limited)
@@ -327,7 +366,51 @@ def _advance(run: _Run, step: Step) -> None:
         )
         run.events.extend(events)
     run.state = state
+    if run.meet:
+        _mend(run)
     clock.lap("t1")
+
+
+def _restrained(run: _Run, step: Step) -> Step:
+    """The step, shortened to where outlines meet."""
+    state, system = run.state, run.system
+    assert system.exterior is not None
+    moved = _moved(run, step)
+    layout = Layout(state.network, state.points, state.offsets, run.turns)
+    after = moved.points, moved.offsets
+    share = restrained(run.foam.cell, layout, after, system.exterior, system.length, system.shares)
+    return Step(share * step.vertices, share * step.offsets, step.pressures)
+
+
+def _mend(run: _Run) -> None:
+    """Contacts made and lost, and markers where outlines need them; the system anew where they were."""
+    state, system, foam = run.state, run.system, run.foam
+    cell, exterior, length = foam.cell, system.exterior, system.length
+    assert exterior is not None
+    network, points, offsets = state.network, state.points, state.offsets
+    source, pressures, run.refused = np.arange(network.n_films), state.pressures, ""
+    if waiting(cell, network, points, offsets, exterior, length, system.shares):
+        if len(run.contacts) > MOST * foam.network.n_films:
+            raise TopologyError("contacts are made and lost again without end")
+        now = replace(foam, network=network, vertex_points=points, film_offsets=offsets, pressures=None)
+        found = make_contacts(now, run.iteration)
+        run.foam, source, run.refused = found.foam, found.source, found.refused
+        run.contacts.extend(found.events)
+        network, points, offsets = run.foam.network, run.foam.vertex_points, run.foam.film_offsets
+        if run.foam.n_bubbles > foam.n_bubbles:
+            run.system = System(
+                cell, run.foam.target_volumes, foam.order, system.factoriser, run.foam.n_bubbles, exterior
+            )
+            run.system.timings = system.timings
+            units = run.system.mean_volume / system.mean_volume * system.film_unit / run.system.film_unit
+            pressures = units * np.append(pressures, np.zeros(run.foam.n_bubbles - foam.n_bubbles))
+    layout = Layout(network, points, offsets, source)
+    layout = with_markers(cell, layout, exterior, run.system.length, run.system.shares)
+    if layout.network is state.network:
+        return
+    run.state = State(layout.network, layout.points, layout.offsets, pressures)
+    run.turns = np.where(layout.source >= 0, run.turns[np.maximum(layout.source, 0)], 0)
+    run.pins = pinned_unknowns(cell, run.state)
 
 
 def _exact_step(run: _Run, lin: Linearised) -> None:
@@ -354,7 +437,18 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
         step = Step(step.vertices + side * KICK * mode, step.offsets, step.pressures)
         size = max(size, KICK)
     share = run.share * min(1.0, EXACT_STEP / max(size, 1e-300))
+    # markers make the matrix inexact: where that throws soft modes to and fro, shorter steps land between
+    back = run.last.shape == step.vertices.shape and now.force > 0.3 * run.past
+    back = back and _cosine(step.vertices, run.last) < -0.5
+    run.damping = max(0.5 * run.damping, LEAST_DAMPING) if back else min(2.0 * run.damping, 1.0)
+    share *= run.damping
+    run.past, run.last = now.force, step.vertices
     _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
+
+
+def _cosine(one: np.ndarray, other: np.ndarray) -> float:
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float((one * other).sum()) / max(size, 1e-300)
 
 
 def _kkt(run: _Run, lin: Linearised, condensed: Condensed, shift: float) -> KKT:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from warpedfoam.arrays import Bools, Floats, Ints
 from warpedfoam.foam import Foam
+from warpedfoam.moves.join import ContactEvent
 from warpedfoam.moves.t1 import T1Event
 
 
@@ -70,6 +71,8 @@ class Relaxation:
         Seconds by kind of work: ``"assemble"``, ``"solve"``, ``"pattern"``, ``"t1"``, ``"total"``.
     message : str
         Why it ended.
+    contacts : tuple of ContactEvent
+        Every contact of open clusters made or lost, in order.
     """
 
     foam: Foam
@@ -84,6 +87,7 @@ class Relaxation:
     history: RelaxationHistory
     timings: Mapping[str, float]
     message: str
+    contacts: tuple[ContactEvent, ...] = field(default=(), kw_only=True)
 
     @property
     def n_t1(self) -> int:

@@ -13,13 +13,14 @@ from typing import Protocol
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from warpedfoam.arrays import Floats, Ints
+from warpedfoam.arrays import Bools, Floats, Ints
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.energy import film_terms
 from warpedfoam.foam import bubble_integrals
 from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.network import CellNetwork
 from warpedfoam.relax.held import held_vertices, hold
@@ -197,8 +198,18 @@ class Linearised:
         clusters = float(volumes.sum())
         volumes[system.exterior] = total - clusters
         # run the other way round, the exterior's loops hold the clusters, or all but them
-        fault = min(abs(loops), abs(loops - total)) if system.invariant else 0.0
+        fault = 0.0
+        if system.invariant and self._all_disks():
+            fault = min(abs(loops), abs(loops - total))
         return 1.0, fault / max(clusters, 1e-300)
+
+    def _all_disks(self) -> bool:
+        """Whether every cluster is a disk: the loops round a ring do not tell what lies outside."""
+        network, exterior = self.state.network, self.system.exterior
+        starts = network.loops.halves[network.loops.starts]
+        outlines = int((network.bubble[starts] == exterior).sum())
+        chi = self.system.cell.surface.euler_characteristic - int(network.bubble_euler[exterior])
+        return outlines == chi
 
     def _residuals(self, volume_error: float) -> Residuals:
         network = self.state.network
@@ -285,8 +296,10 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
         )
         count, part = connected_components(links, directed=False)
         if cell.parallel and cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
-            turning = np.cross(cell.surface.normals(state.points), state.points)
-            modes = np.concatenate([modes, turning[None]])
+            points, round_ = unfolded(cell, state, np.asarray(part, dtype=np.int64))
+            turning = np.cross(cell.surface.normals(state.points), points)
+            # what goes round the surface cannot turn
+            modes = np.concatenate([modes, np.where(round_[part][:, None], 0.0, turning)[None]])
         own = part == np.arange(count)[:, None]
         modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
     frames = cell.surface.vertex_frames(state.points)
@@ -300,6 +313,42 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     size = np.linalg.norm(flat, axis=1)
     kept: Floats = flat[size > 1e-6 * cell.surface.size]
     return kept
+
+
+def unfolded(cell: HeleShawCell, state: State, part: Ints) -> tuple[Floats, Bools]:
+    """Vertices of each part of a foam in one copy of the surface, and which parts go round it."""
+    network, period = state.network, cell.surface.period
+    n_parts = int(part.max()) + 1
+    if period is None:
+        return state.points, np.zeros(n_parts, dtype=np.bool_)
+    chord = state.points[network.heads] - state.points[network.tails]
+    shift = nearest_image(chord, period) - chord
+    # whole periods from the first vertex of each part, along a tree of its films
+    links = coo_array(
+        (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
+    ).tocsr()
+    total = np.zeros_like(state.points)
+    ends = np.concatenate([network.tails, network.heads]), np.concatenate([network.heads, network.tails])
+    code = ends[0] * network.n_vertices + ends[1]
+    order = np.argsort(code, kind="stable")
+    signed = np.concatenate([shift, -shift])
+    first = np.unique(part, return_index=True)[1]
+    before = np.full(network.n_vertices, -1)
+    for start in first.tolist():
+        reached, parent = breadth_first_order(links, start, directed=False)
+        before[reached[1:]] = parent[reached[1:]]
+    joined = np.flatnonzero(before >= 0)
+    at = order[np.searchsorted(code[order], before[joined] * network.n_vertices + joined)]
+    total[joined] = signed[at]
+    ahead = np.where(before >= 0, before, np.arange(network.n_vertices))
+    for _ in range(int(np.ceil(np.log2(network.n_vertices + 1)))):
+        total, ahead = total + total[ahead], ahead[ahead]
+    points = state.points + total
+    gap = points[network.heads] - points[network.tails] - nearest_image(chord, period)
+    wraps = np.linalg.norm(gap, axis=1) > 0.1 * float(period[np.isfinite(period)].min())
+    out = np.zeros(n_parts, dtype=np.bool_)
+    out[part[network.tails[wraps]]] = True
+    return points, out
 
 
 def pinned_unknowns(cell: HeleShawCell, state: State) -> Ints:

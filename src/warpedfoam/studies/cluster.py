@@ -19,6 +19,7 @@ from warpedfoam.tessellate.layouts import (
     DRAWS,
     SPACING,
     Layout,
+    along_x,
     ghosts,
     hexagonal_centres,
     planar_layout,
@@ -42,7 +43,7 @@ def cluster_foam(
     layout: str | ArrayLike = "hexagonal",
     centre: ArrayLike | None = None,
     orientation: float | ArrayLike = 0.0,
-    max_turn: float | None = None,
+    max_turn: float = 60.0,
     order: int = 8,
     seed: int | None = None,
 ) -> Foam:
@@ -67,11 +68,11 @@ def cluster_foam(
         Middle of each cluster, projected; `Surface.lattice_points` by default.
     orientation : float or (k,) array, optional
         Angle in radians from the first of `Surface.vertex_frames` at the centre (on a torus: up the tube)
-        to the layout's x axis, counter-clockwise.
+        to the layout's x axis, counter-clockwise; of a hexagonal patch that is its long axis, if it has
+        one.
     max_turn : float, optional
         Outer films are divided by markers so that pieces turn by about this many degrees at most, 10 …
-        150; by default 60, and 150 (only where it must be) in random layouts, because films that end in
-        a marker make no T1.
+        150.
     order : int, optional
         p of the films.
     seed : int, optional
@@ -102,8 +103,6 @@ def cluster_foam(
     """
     as_instance(cell, "cell", HeleShawCell)
     surface = cell.surface
-    if max_turn is None:
-        max_turn = 150.0 if isinstance(layout, str) and layout == "random" else 60.0
     layouts, seed = _layouts(n_bubbles, layout, max_turn, seed)
     counts = [plan.n_bubbles for plan in layouts]
     k, n = len(layouts), sum(counts)
@@ -219,7 +218,8 @@ def _layouts(
         raise ValueError("n_bubbles is empty")
     counts = [as_integer(n, "n_bubbles", minimum=1) for n in listed]
     if kind == "hexagonal":
-        return [_simple(hexagonal_centres(n), None, turn) for n in counts], seed
+        middles = [hexagonal_centres(n) for n in counts]
+        return [along_x(_simple(at, None, turn), at) for at in middles], seed
     if seed is None:
         raise ValueError('layout="random" needs a seed')
     seed = as_integer(seed, "seed", minimum=0)

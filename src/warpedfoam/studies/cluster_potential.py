@@ -93,7 +93,7 @@ def cluster_potential(
     hold: str = "centre",
     orientation: float | ArrayLike = 0.0,
     order: int = 8,
-    max_turn: float | None = None,
+    max_turn: float = 60.0,
     seed: int | None = None,
     tolerance: float = 1e-10,
     max_iterations: int = 200,

@@ -6,7 +6,7 @@ merge into the outside. Lengths are such that a hexagonal cell has area 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import Voronoi, cKDTree
@@ -89,6 +89,24 @@ def ghosts(centres: Floats) -> Floats:
     away = cKDTree(centres).query(grid)[0]
     out: Floats = grid[(away > 0.7 * SPACING) & (away < 3.5 * SPACING)]
     return out
+
+
+def along_x(layout: Layout, centres: Floats) -> Layout:
+    """The layout turned so that the long axis of its ``centres`` (n, 2) is x, if they have one.
+
+    Examples
+    --------
+    >>> two = hexagonal_centres(2)
+    >>> plan = along_x(planar_layout(two, ghosts(two), 60.0), two)
+    >>> middles = np.array([plan.points[loop].mean(axis=0) for loop in plan.loops])
+    >>> float(np.ptp(middles[:, 1])) < 1e-12
+    True
+    """
+    size, axes = np.linalg.eigh(centres.T @ centres)
+    if size[1] - size[0] <= 1e-9 * size[1]:
+        return layout
+    x, y = axes[:, 1] if axes[0, 1] > 0.0 or (axes[0, 1] == 0.0 and axes[1, 1] > 0.0) else -axes[:, 1]
+    return replace(layout, points=frozen(layout.points @ np.array([[x, -y], [y, x]])))
 
 
 def planar_layout(centres: Floats, around: Floats, max_turn: float) -> Layout:
