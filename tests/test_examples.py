@@ -39,6 +39,7 @@ def test_every_example_is_tested() -> None:
         "05_polydispersity_ensemble",
         "06_scars_on_spheres",
         "07_bubble_on_a_torus",
+        "08_gap_against_curvature",
     }  # fmt: skip
     assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
@@ -119,3 +120,11 @@ def test_bubble_on_a_torus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert apart < 2e-6
     assert {p.name for p in tmp_path.iterdir()} == {"torus_energy.png", "torus_energy.csv"}
     assert len(capsys.readouterr().out.splitlines()) == 4
+
+
+def test_gap_against_curvature(capsys: pytest.CaptureFixture[str]) -> None:
+    found, second, left = example("08_gap_against_curvature").main()
+    assert found == pytest.approx(0.9417173, abs=1e-6)
+    assert second == pytest.approx(found, abs=0.006)
+    assert abs(left) < 1e-10
+    assert len(capsys.readouterr().out.splitlines()) == 3
