@@ -1,5 +1,5 @@
 """The table of bad calls, and what they work on; the rows are in `bad_geometry`,
-`bad_foams` and `bad_bubbles`."""
+`bad_foams`, `bad_gaps` and `bad_bubbles`."""
 
 from __future__ import annotations
 

@@ -38,7 +38,6 @@ table(
         (small(), TypeError, "got TriangleMesh"),
     ],
 )
-table("gap varies", lambda v: wf.HeleShawCell(SPHERE, gap=v), [(np.sin, TypeError, "gap must be a number")])
 table(
     "n_heights",
     lambda v: wf.HeleShawCell(SPHERE, 0.1, v),

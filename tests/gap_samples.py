@@ -23,7 +23,7 @@ PLATE = flat_plate()
 
 
 def shaken_ball():
-    mesh = BALL.triangulate(1500)
+    mesh = BALL.triangulate(800)
     push = np.random.default_rng(0).uniform(-1.0, 1.0, mesh.nodes.shape)
     return wf.MeshSurface(BALL.project(mesh.nodes + 0.1 * mesh.mean_edge * push), mesh.triangles)
 
@@ -45,14 +45,14 @@ def waves(x):
 
 
 CASES = {
-    "sphere": Case(BALL, lambda x: 1.0 + 0.3 * x[:, 0] + 0.1 * np.sin(2.0 * x[:, 2]), 60),
+    "sphere": Case(BALL, lambda x: 1.0 + 0.3 * x[:, 0] + 0.1 * np.sin(2.0 * x[:, 2]), 40),
     "torus": Case(RING, waves, 160),
-    "plane": Case(PLATE, lambda x: 1.0 + 0.03 * x[:, 0] + 0.05 * np.cos(0.3 * x[:, 1]), 40),
-    "egg": Case(wf.Ellipsoid(1.0, 1.2, 1.5), waves, 60),
+    "plane": Case(PLATE, lambda x: 1.0 + 0.03 * x[:, 0] + 0.05 * np.cos(0.3 * x[:, 1]), 30),
+    "egg": Case(wf.Ellipsoid(1.0, 1.2, 1.5), waves, 40),
     "sheet": Case(
         wf.FlatTorus(10.0, 8.0),
         lambda x: 1.0 + 0.2 * np.sin(0.2 * np.pi * x[:, 0]) + 0.1 * np.cos(0.25 * np.pi * x[:, 1]),
-        60,
+        40,
     ),
 }
 each_case = pytest.mark.parametrize("name", CASES)

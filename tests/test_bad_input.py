@@ -12,7 +12,7 @@ import pytest
 
 import warpedfoam as wf
 
-from . import bad_bubbles, bad_foams, bad_geometry  # noqa: F401 - they fill the table
+from . import bad_bubbles, bad_foams, bad_gaps, bad_geometry  # noqa: F401 - they fill the table
 from .bad_calls import BAD, SPHERE, Bad, cell, changed
 
 ROOT = Path(__file__).parents[1]
@@ -37,7 +37,7 @@ def test_bad_calls_say_what_is_wrong(row: Bad, tmp_path: Path, monkeypatch: pyte
 SURVIVAL = """
 import warnings
 warnings.simplefilter("error")
-from tests import bad_bubbles, bad_calls, bad_foams, bad_geometry
+from tests import bad_bubbles, bad_calls, bad_foams, bad_gaps, bad_geometry
 refused = 0
 for row in bad_calls.BAD:
     try:

@@ -40,6 +40,7 @@ def test_every_example_is_tested() -> None:
         "06_scars_on_spheres",
         "07_bubble_on_a_torus",
         "09_three_bubbles_drifting",
+        "08_gap_against_curvature",
     }  # fmt: skip
     assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
@@ -141,3 +142,11 @@ def test_three_bubbles_drifting(tmp_path: Path, capsys: pytest.CaptureFixture[st
         "three_bubbles.png", "three_bubbles.csv", "seven.png", "seven.csv",
     }  # fmt: skip
     assert len(capsys.readouterr().out.splitlines()) == 12
+
+
+def test_gap_against_curvature(capsys: pytest.CaptureFixture[str]) -> None:
+    found, second, left = example("08_gap_against_curvature").main()
+    assert found == pytest.approx(0.9417173, abs=1e-6)
+    assert second == pytest.approx(found, abs=0.006)
+    assert abs(left) < 1e-10
+    assert len(capsys.readouterr().out.splitlines()) == 3

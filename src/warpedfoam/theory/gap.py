@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from warpedfoam.arrays import Floats
 from warpedfoam.theory.bubbles import curvature_coefficient, flat_energy
 from warpedfoam.theory.inputs import as_values
+from warpedfoam.theory.second_order import second_order_ratio
 
 
 def gap_energy_change(
@@ -72,20 +73,31 @@ def balancing_gap_change(volume: ArrayLike, gaussian_curvature: ArrayLike) -> Fl
     return as_values(gaussian_curvature, "gaussian_curvature") * v / (3.0 * np.pi)
 
 
-def second_order_balance(volume: ArrayLike, gap: ArrayLike, gaussian_curvature: ArrayLike) -> Floats:
-    """δd = (¾ + πd³/4V) GV/(3π): `balancing_gap_change` for ruled films, consistent in the curvatures; length.
+def second_order_balance(
+    volume: ArrayLike,
+    gap: ArrayLike,
+    k1: ArrayLike,
+    k2: ArrayLike,
+    *,
+    height: ArrayLike = 0.0,
+    film: str = "free",
+) -> Floats:
+    """δd = 2d (1 − E/E0) with `second_order_ratio`: `balancing_gap_change` to second order; length.
 
-    To second order in the curvatures E/E0 = 1 − G (ρ²/8 + d²/24) + …, not 1 − G ρ²/6; what is left out is
-    the twist of the films, −d² D²/24 with D half the difference of the principal curvatures, and
-    relative corrections of the order of the bubble's size over the radii of curvature, squared.
+    Its change from one place to another is that of the gap which leaves a bubble no preference. On top of a
+    torus, films ruled, the tube must be shifted by (¾ + 5πd³/16V) V/(3π (r + d/2) R), not by V/(3πrR).
 
     Examples
     --------
-    >>> float((second_order_balance(0.5, 0.5, 0.0125) / balancing_gap_change(0.5, 0.0125)).round(5))
-    0.94635
+    >>> from warpedfoam.theory import torus_curvatures
+    >>> k1, k2 = torus_curvatures([1.57, 1.5716], 20.0, 4.0)
+    >>> above, below = second_order_balance(0.5, 0.5, k1, k2, film="ruled")
+    >>> float(((above - below) / 0.0016).round(6))  # the paper: 0.000663
+    0.000621
     """
-    v, d = as_values(volume, "volume", positive=True), as_values(gap, "gap", positive=True)
-    return (0.75 + 0.25 * np.pi * d**3 / v) * balancing_gap_change(v, gaussian_curvature)
+    ratio = second_order_ratio(volume, gap, k1, k2, height=height, film=film)
+    out: Floats = 2.0 * as_values(gap, "gap", positive=True) * (1.0 - ratio)
+    return out
 
 
 def varying_gap_energy(
