@@ -184,3 +184,10 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+
+
+def test_the_motion_page() -> None:
+    space = run(ROOT / "docs" / "motion.md")
+    assert space["moved"].completed
+    assert (np.diff(space["angle"]) < 0.0).all()
+    assert (np.diff(space["moved"].step_energies) < 0.0).all()

@@ -400,7 +400,7 @@ def test_a_start_far_from_its_volumes_is_refused() -> None:
 def test_a_grain_that_vanishes_ends_the_run() -> None:
     """No pressure holds a small circle: it shrinks to nothing, and the run says when it stopped."""
     foam = one_bubble(order=4, volume=0.05)
-    moved = wf.drift(foam, duration=10.0, every=1.0, hold_volumes=False, tolerance=0.05)
+    moved = wf.drift(foam, duration=10.0, every=1.0, hold_volumes=False, tolerance=0.1)
     assert not moved.completed
     assert "bubble 0 has all but vanished" in moved.message
     # a flat circle lives for A λ/(2πγ)

@@ -46,7 +46,19 @@ def test_every_module_has_its_layer() -> None:
     assert present <= set().union(*layers)
     assert set().union(*layers) - present <= {"studies"}  # to come
     place = {name: i for i, layer in enumerate(layers) for name in layer}
-    order = ["cli", "plot", "studies", "relax", "energy", "foam", "cell", "surfaces", "kernels", "arrays"]
+    order = [
+        "cli",
+        "plot",
+        "studies",
+        "motion",
+        "relax",
+        "energy",
+        "foam",
+        "cell",
+        "surfaces",
+        "kernels",
+        "arrays",
+    ]
     assert [place[name] for name in order] == list(range(len(layers) - 1))
     siblings = ({"tessellate", "energy", "moves", "analysis", "io"}, {"surfaces", "network"})
     assert all(group in layers for group in siblings)

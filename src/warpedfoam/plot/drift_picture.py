@@ -32,6 +32,8 @@ ENDINGS, MOST_FRAMES = (".gif", ".mp4"), 2000
 DIRECTIONS = 4000
 #: Room round the bubbles in a close view, as a share of them; all is shown from a share of the whole on.
 MARGIN, WHOLE = 0.15, 0.7
+#: A first fall so many times as great as all that follows is cut off.
+STEEP = 3.0
 #: Frames in the picture of a drift whose choice is left to it.
 SHOWN = 4
 
@@ -187,7 +189,7 @@ def _pictures(
         above.set_title(f"t = {time:.4g}", fontsize=10)
         below.plot(times, energies, color="0.6", lw=1.2)
         below.plot([time], [energy], "o", color="#cc3d28", ms=5)
-        _label(below)
+        _label(below, energies)
         canvas.draw()
         pixels = np.asarray(canvas.buffer_rgba())[:, :, :3]
         yield pixels[: pixels.shape[0] // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
@@ -311,10 +313,19 @@ def _energy_axes(axes: Axes, drift: Drift) -> None:
             label="T1",
         )
         axes.legend(frameon=False)
-    _label(axes)
+    _label(axes, drift.energies)
 
 
-def _label(axes: Any) -> None:
+def _label(axes: Any, energies: Floats) -> None:
+    """Names of the axes; the fall in which a raw start finds its shape is cut off, and said so."""
+    if len(energies) > 3:
+        low, high = float(energies.min()), float(energies[1:].max())
+        if energies[0] - high > STEEP * (high - low) > 0.0:
+            room = 0.1 * (high - low)
+            axes.set_ylim(low - room, high + room)
+            axes.annotate(
+                f"from {energies[0]:.6g} at first", (0.02, 0.9), xycoords="axes fraction", fontsize=9
+            )
     axes.set_xlabel("time")
     axes.set_ylabel("energy")
     axes.ticklabel_format(axis="y", useOffset=False)
