@@ -484,6 +484,9 @@ def test_the_command_says_how_it_went(tmp_path: Path) -> None:
     [
         (["--set", "repeat=2"], "--set repeat=2: unknown option repeat; did you mean repeats?"),
         (["--set", "surface.radius=x"], "surface.radius must be a number"),
+        (["--set", "foam.n_bubbles=100000000"], "foam.n_bubbles must be at most 200000"),
+        (["--set", "grid.foam.n_bubbles=14"], "grid.foam.n_bubbles must be a list of values"),
+        (["--set", "grid.foam.bubbles=[14]"], "did you mean foam.n_bubbles?"),
         (["--scheduler", "nonsense"], "nonsense"),
     ],
 )

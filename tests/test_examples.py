@@ -105,7 +105,7 @@ def test_polydispersity_ensemble(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_scars_on_spheres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scars = example("06_scars_on_spheres")
-    monkeypatch.setattr(scars, "COOLING_STEPS", 800)
+    monkeypatch.setattr(scars, "LEAST_COOLING", 800)
     monkeypatch.setattr(scars, "STEPS", 4)
     monkeypatch.setattr(scars, "SIZES", (100,))
     rows = scars.main(2, 100, tmp_path)

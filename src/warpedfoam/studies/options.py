@@ -26,7 +26,7 @@ from warpedfoam.surfaces import (
     Surface,
     Torus,
 )
-from warpedfoam.tessellate.build import CELL_KINDS, SEED_KINDS
+from warpedfoam.tessellate.build import CELL_KINDS, MOST_BUBBLES, MOST_NODES, SEED_KINDS
 
 Section = TypeVar("Section")
 DEFAULT_BUBBLES = 200
@@ -50,8 +50,8 @@ def read_by(reader: Callable[[Any, str], Any]) -> Mapping[str, Any]:
     return {"read": reader}
 
 
-def _at_least(minimum: int) -> Callable[[Any, str], int]:
-    return lambda value, name: as_integer(value, name, minimum=minimum)
+def _at_least(minimum: int, most: int | None = None) -> Callable[[Any, str], int]:
+    return lambda value, name: as_integer(value, name, minimum=minimum, maximum=most)
 
 
 def _above_zero(value: Any, name: str) -> float:
@@ -111,12 +111,12 @@ class CellOptions:
 class FoamOptions:
     """What `warpedfoam.voronoi_foam` is given; None leaves it its own default."""
 
-    n_bubbles: int | None = field(default=None, metadata=read_by(_at_least(1)))
+    n_bubbles: int | None = field(default=None, metadata=read_by(_at_least(1, MOST_BUBBLES)))
     seeds: Any = field(default="random", metadata=read_by(_seeds))
     cells: str = field(default="voronoi", metadata=read_by(_one_of(*CELL_KINDS)))
     lloyd: int = field(default=0, metadata=read_by(_at_least(0)))
     volumes: Any = field(default=None, metadata=read_by(_volumes))
-    n_nodes: int | None = field(default=None, metadata=read_by(_at_least(1)))
+    n_nodes: int | None = field(default=None, metadata=read_by(_at_least(1, MOST_NODES)))
 
 
 @dataclass(frozen=True)
