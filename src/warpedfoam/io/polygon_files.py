@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from warpedfoam.arrays import Floats
 from warpedfoam.errors import FileFormatError
 
-Polygons = tuple[Floats, list[list[int]]]
+#: Points, polygons, and how many of the first points are vertices of a foam (0: not told).
+Polygons = tuple[Floats, list[list[int]], int]
+
+#: A comment in the files of `write_ply` (from 0) and `write_obj` (from 1): which points are vertices.
+_VERTICES = re.compile(r"vertices ([01]) to (\d{1,9}) are the foam's")
 
 _KINDS = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -41,7 +47,12 @@ def obj_polygons(data: bytes) -> Polygons:
                 polygons.append([p - 1 if p > 0 else len(points) + p if p else -1 for p in places])
         except ValueError as fault:
             raise FileFormatError(f"line {number} cannot be understood ({fault})") from None
-    return np.array(points, dtype=np.float64).reshape(-1, 3), polygons
+    return np.array(points, dtype=np.float64).reshape(-1, 3), polygons, _told(_text(data))
+
+
+def _told(text: str) -> int:
+    found = _VERTICES.search(text)
+    return int(found[2]) + 1 - int(found[1]) if found else 0
 
 
 def ply_polygons(data: bytes) -> Polygons:
@@ -60,9 +71,9 @@ def ply_polygons(data: bytes) -> Polygons:
     if form == "ascii":
         words = _text(body).split()
         if len(words) > 0 and elements:
-            return _walk_words(words, elements)
+            return *_walk_words(words, elements), _told(_text(head))
         raise FileFormatError("it has no body")
-    return _walk_bytes(body, elements, "<" if form == "binary_little_endian" else ">")
+    return *_walk_bytes(body, elements, "<" if form == "binary_little_endian" else ">"), _told(_text(head))
 
 
 Property = tuple[str, str, str | None]
@@ -98,7 +109,7 @@ def _header(text: str) -> tuple[str, list[Element]]:
     return form, elements
 
 
-def _walk_words(words: list[str], elements: list[Element]) -> Polygons:
+def _walk_words(words: list[str], elements: list[Element]) -> tuple[Floats, list[list[int]]]:
     points, polygons = np.zeros((0, 3)), [[0][:0]]
     polygons.clear()
     at = 0
@@ -130,7 +141,7 @@ def _walk_words(words: list[str], elements: list[Element]) -> Polygons:
     return points, polygons
 
 
-def _walk_bytes(body: bytes, elements: list[Element], order: str) -> Polygons:
+def _walk_bytes(body: bytes, elements: list[Element], order: str) -> tuple[Floats, list[list[int]]]:
     points = np.zeros((0, 3))
     polygons: list[list[int]] = []
     at = 0
