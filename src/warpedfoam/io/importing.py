@@ -121,6 +121,9 @@ def _read(path: Path) -> Polygons:
         raise FileFormatError("it holds no polygons")
     if not np.isfinite(points).all():
         raise FileFormatError("it holds points that are not finite")
+    if any(len(polygon) < 3 for polygon in polygons):
+        bad = next(k for k, polygon in enumerate(polygons) if len(polygon) < 3)
+        raise FileFormatError(f"polygon {bad} has {len(polygons[bad])} corners; it needs three")
     if any(not 0 <= k < len(points) for polygon in polygons for k in polygon):
         raise FileFormatError(f"a polygon names a point that is not one of its {len(points)}")
     return points, polygons, min(vertices, len(points))

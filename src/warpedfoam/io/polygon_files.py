@@ -21,6 +21,9 @@ _KINDS = {
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
+#: The end of a PLY header, on a line of its own, and the byte order mark of some editors.
+_END = re.compile(rb"[\r\n]end_header[ \t]*(?:\r\n|\n|\r|$)")
+_MARK = b"\xef\xbb\xbf"
 _LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -63,10 +66,11 @@ def ply_polygons(data: bytes) -> Polygons:
     FileFormatError
         If the header or the body cannot be understood, or the file ends too early.
     """
-    head, mark, body = data.partition(b"end_header")
-    if not mark or not data.startswith(b"ply"):
+    data = data.removeprefix(_MARK)
+    end = _END.search(data)
+    if end is None or not data.startswith(b"ply"):
         raise FileFormatError("it is no PLY file, or its header does not end")
-    body = body[2:] if body.startswith(b"\r\n") else body[1:]
+    head, body = data[: end.start()], data[end.end() :]
     form, elements = _header(_text(head))
     if form == "ascii":
         words = _text(body).split()
@@ -97,6 +101,8 @@ def _header(text: str) -> tuple[str, list[Element]]:
                     raise ValueError(f"{count} elements")
                 elements.append((words[1], count, []))
             elif words[0] == "property" and words[1] == "list":
+                if _KINDS[words[2]].startswith("f"):
+                    raise ValueError("a list's length is no whole number")
                 elements[-1][2].append((words[4], _KINDS[words[3]], _KINDS[words[2]]))
             elif words[0] == "property":
                 elements[-1][2].append((words[2], _KINDS[words[1]], None))
@@ -183,7 +189,7 @@ def _axes(properties: list[Property]) -> list[int]:
 
 
 def _text(data: bytes) -> str:
-    try:
-        return data.decode("utf-8").replace("\r\n", "\n")
-    except UnicodeDecodeError:
-        raise FileFormatError("it is no text where text is expected") from None
+    """Text in whatever extension of ASCII: numbers and keywords are ASCII, comments are passed over."""
+    if b"\0\0" in data or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise FileFormatError("it is no text where text is expected")
+    return data.removeprefix(_MARK).decode("utf-8", errors="replace").replace("\r\n", "\n")

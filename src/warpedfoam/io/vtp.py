@@ -17,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from warpedfoam.arrays import Ints, as_choice, as_instance, as_integer
+from warpedfoam.arrays import Ints, as_choice, as_instance, as_integer, as_number
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path, atomic_text, writable_path
@@ -98,7 +98,7 @@ def write_vtp(
     as_instance(foam, "foam", Foam)
     state = _stored(foam)
     if time is not None:
-        state["TimeValue"] = np.array([time], dtype=np.float64)
+        state["TimeValue"] = np.array([as_number(time, "time")])
     part = as_choice(parts, "parts", PARTS)
     filled = as_choice(fill, "fill", FILLS)
     default = 5 if foam.n_bubbles > 2000 else 9
