@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from warpedfoam.arrays import Floats, Ints, as_indices, as_instance, as_integer, as_number, as_points
+from warpedfoam.arrays import Bools, Floats, Ints, as_indices, as_instance, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import FileFormatError, TopologyError
 from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
 from warpedfoam.io.atomic import PathLike, as_path
-from warpedfoam.io.polygon_files import obj_polygons, ply_polygons
+from warpedfoam.io.polygon_files import Polygons, obj_polygons, ply_polygons
 from warpedfoam.io.reading import existing
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
@@ -33,12 +33,14 @@ def import_polygons(
     order: int = 4,
     tolerance: float = 0.05,
     weld: float = 1e-6,
+    exterior: int | str | None = None,
 ) -> Foam:
     """Foam whose bubbles are the polygons of a cell network that was made elsewhere.
 
     Points where three polygons meet become vertices, the points between them give films their shapes: the
     offsets of each film are fitted to its points by least squares. Polygons that run clockwise, seen from
-    the gap, are turned round. Where a surface repeats in space points and their images are one.
+    the gap, are turned round. Where a surface repeats in space points and their images are one. Where it
+    has a rim edges along it are walls, and films end on it.
 
     Parameters
     ----------
@@ -52,6 +54,9 @@ def import_polygons(
         How far points may lie from the surface, in units of the bubble size; they are projected.
     weld : float, optional
         Points closer than that, in units of the bubble size, are one.
+    exterior : int or "holes", optional
+        The polygon that is the exterior of open clusters, or that all which the polygons leave open is: it
+        becomes the last bubble. Its pressure is 0.
 
     Returns
     -------
@@ -67,14 +72,16 @@ def import_polygons(
     FileFormatError
         If the file cannot be read.
     TopologyError
-        If the polygons are no foam: an edge with a polygon on one side only, a vertex where more than three
-        meet, another Euler characteristic than the surface's.
+        If the polygons are no foam: an edge off the rim with a polygon on one side only and no exterior
+        beyond it, a vertex where more than three meet, another Euler characteristic than the surface's.
     ValueError
         If points lie too far from the surface, are not finite, or are named that do not exist.
 
     Notes
     -----
     A bubble cut into several polygons (as `write_ply` does beyond 255 corners) comes back as several.
+    Vertices where only two films meet are told from other points in files of `write_ply` and `write_obj`
+    only; elsewhere the films on either side become one, which wants a higher ``order`` if it is long.
 
     Examples
     --------
@@ -89,44 +96,52 @@ def import_polygons(
     p = as_integer(order, "order", minimum=2, maximum=MAX_ORDER)
     allowed = as_number(tolerance, "tolerance", minimum=0.0)
     close = as_number(weld, "weld", minimum=0.0)
+    if isinstance(exterior, str) and exterior != "holes":
+        raise ValueError(f"exterior must be the place of a polygon, 'holes' or None, got {exterior!r}")
     if isinstance(source, tuple):
         if len(source) != 2:
             raise TypeError(f"source must be a path or (points, polygons), got a tuple of {len(source)}")
-        return _foam(cell, source[0], source[1], p, allowed, close)
+        return _foam(cell, source[0], source[1], 0, p, allowed, close, exterior)
     path = existing(as_path(source, "source"))
     try:
-        return _foam(cell, *_read(path), p, allowed, close)
+        return _foam(cell, *_read(path), p, allowed, close, exterior)
     except (FileFormatError, TopologyError) as fault:
         raise type(fault)(f"cannot import {path}: {fault}") from None
 
 
-def _read(path: Path) -> tuple[Floats, list[list[int]]]:
+def _read(path: Path) -> Polygons:
     kind, data = path.suffix.lower(), path.read_bytes()
     if kind == ".ply":
-        points, polygons = ply_polygons(data)
+        points, polygons, vertices = ply_polygons(data)
     elif kind == ".obj":
-        points, polygons = obj_polygons(data)
+        points, polygons, vertices = obj_polygons(data)
     else:
         raise ValueError(f"source must be a .ply or .obj file, got {path.name!r}")
     if not len(points) or not polygons:
         raise FileFormatError("it holds no polygons")
     if not np.isfinite(points).all():
         raise FileFormatError("it holds points that are not finite")
+    if any(len(polygon) < 3 for polygon in polygons):
+        bad = next(k for k, polygon in enumerate(polygons) if len(polygon) < 3)
+        raise FileFormatError(f"polygon {bad} has {len(polygons[bad])} corners; it needs three")
     if any(not 0 <= k < len(points) for polygon in polygons for k in polygon):
         raise FileFormatError(f"a polygon names a point that is not one of its {len(points)}")
-    return points, polygons
+    return points, polygons, min(vertices, len(points))
 
 
 def _foam(
     cell: HeleShawCell,
     points: ArrayLike,
     polygons: Sequence[Sequence[int]],
+    vertices: int,
     order: int,
     tolerance: float,
     weld: float,
+    exterior: int | str | None,
 ) -> Foam:
     x = as_points(points, "points")
-    if len(polygons) < 2:
+    holes = exterior == "holes"
+    if len(polygons) < 2 - holes:
         raise TopologyError(f"polygons must be two at least, got {len(polygons)}")
     loops = [
         as_indices(np.asarray(polygon), f"polygons[{i}]", (None,), below=len(x))
@@ -141,33 +156,49 @@ def _foam(
     if (sizes < 3).any():
         bad = int(np.flatnonzero(sizes < 3)[0])
         raise TopologyError(f"polygon {bad} has {int(sizes[bad])} different corners; it needs three")
+    marked = np.zeros(len(x), dtype=bool)
+    marked[merged[:vertices]] = True
     used, corners = np.unique(corners, return_inverse=True)
-    on = on[used]
-    rings = np.split(corners, np.cumsum(sizes)[:-1])
+    on, marked = on[used], marked[used]
     if _turned(cell, on, corners, sizes):
-        rings = [ring[::-1] for ring in rings]
-    _check_degrees(corners, sizes, on)
-    network = network_from_loops([ring.tolist() for ring in rings])
+        corners = np.concatenate([ring[::-1] for ring in np.split(corners, np.cumsum(sizes)[:-1])])
+    corners, sizes, on, kept = _rimmed(cell, corners, sizes, on, tolerance * unit)
+    marked = marked[kept]
+    rings = [ring.tolist() for ring in np.split(corners, np.cumsum(sizes)[:-1])]
+    if holes:
+        rings += _holes(cell, corners, sizes, on)
+    _check_degrees(rings, on, _on_rim(cell, on))
+    network = network_from_loops(rings, rims=cell.surface.rim is not None)
+    place = exterior if isinstance(exterior, int) else None
+    if holes:
+        place = len(sizes)
+        if network.n_bubbles == place:
+            raise TopologyError("the polygons leave no hole for an exterior")
+        network = _one_exterior(network, place, cell.surface.euler_characteristic)
     chi = cell.surface.euler_characteristic
     if network.euler_characteristic != chi:
         raise TopologyError(
             f"the polygons close a surface of Euler characteristic {network.euler_characteristic}, "
             f"the cell's has {chi}"
         )
-    short, heads, films, inner, places = _merged(network)
+    short, heads, films, inner, places = _merged(network, marked)
     tails_at, heads_at = on[heads[:, 0]], on[heads[:, 1]]
     offsets = _fitted(cell, tails_at, heads_at, films, on[inner], places, order)
-    kept = np.unique(heads)
-    return Foam(cell, short, on[kept], offsets, _volumes(cell, short, on[kept], offsets))
+    ends = on[np.unique(heads)]
+    volumes = _volumes(cell, short, ends, offsets, place)
+    return Foam(cell, short, ends, offsets, volumes, exterior=place)
 
 
-def _volumes(cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats) -> Floats:
-    """The bubbles' volumes, made to add up: their quadrature has an error."""
+def _volumes(
+    cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: Floats, exterior: int | None
+) -> Floats:
+    """The bubbles' volumes, made to add up: their quadrature has an error, or an exterior has the rest."""
     volumes = bubble_integrals(cell, network, points, offsets, cell.layer)
+    if exterior is not None:
+        volumes[exterior] = 0.0
+        volumes[exterior] = cell.volume - volumes.sum()
     total = float(volumes.sum())
-    if (network.bubble_euler == 1).all() and not abs(total - cell.volume) <= (
-        cell.surface.precision * cell.volume
-    ):
+    if not abs(total - cell.volume) <= cell.surface.precision * cell.volume:
         raise TopologyError(
             f"the polygons cover {total / cell.volume:.6g} times the cell's volume; they must cover the "
             "surface once, without folds"
@@ -177,6 +208,83 @@ def _volumes(cell: HeleShawCell, network: CellNetwork, points: Floats, offsets: 
         raise TopologyError(f"polygon {bad} has the volume {volumes[bad]:.3g}; it is empty or inside out")
     out: Floats = volumes * (cell.volume / total)
     return out
+
+
+def _lonely(corners: Ints, sizes: Ints, count: int) -> tuple[Ints, Bools]:
+    """The corner after each, and whether no polygon runs the other way along the edge to it."""
+    starts = np.cumsum(sizes) - sizes
+    after = np.arange(len(corners)) + 1
+    after[starts + sizes - 1] = starts
+    forth = corners * count + corners[after]
+    return after, ~np.isin(forth, corners[after] * count + corners)
+
+
+def _rimmed(
+    cell: HeleShawCell, corners: Ints, sizes: Ints, on: Floats, allowed: float
+) -> tuple[Ints, Ints, Floats, Ints]:
+    """Polygons without the points along walls, where no film ends; points with the ends on the rim.
+
+    The last array holds the places that the points had.
+    """
+    rim = cell.surface.rim
+    if rim is None:
+        return corners, sizes, on, np.arange(len(on))
+    after, alone = _lonely(corners, sizes, len(on))
+    moved = rim.nearest(on)
+    near = np.linalg.norm(moved - on, axis=1) <= allowed
+    wall = alone & near[corners] & near[corners[after]]
+    before = np.empty(len(after), dtype=np.int64)
+    before[after] = np.arange(len(after))
+    keep = ~(wall & wall[before])
+    ends = np.unique(np.concatenate([corners[wall], corners[after[wall]]]))
+    on = on.copy()
+    on[ends] = moved[ends]
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    corners, sizes = corners[keep], np.bincount(owner[keep], minlength=len(sizes))
+    if (sizes < 2).any():
+        bad = int(np.flatnonzero(sizes < 2)[0])
+        raise TopologyError(f"polygon {bad} has walls only, or one film end: no foam has such a bubble")
+    used, corners = np.unique(corners, return_inverse=True)
+    return corners, sizes, on[used], used
+
+
+def _on_rim(cell: HeleShawCell, on: Floats) -> Bools:
+    """Which points lie on the rim."""
+    rim = cell.surface.rim
+    if rim is None:
+        return np.zeros(len(on), dtype=bool)
+    out: Bools = np.linalg.norm(rim.nearest(on) - on, axis=1) <= 1e-9 * cell.surface.size
+    return out
+
+
+def _holes(cell: HeleShawCell, corners: Ints, sizes: Ints, on: Floats) -> list[list[int]]:
+    """Loops round what the polygons leave open, seen from there; edges between rim points are walls."""
+    after, alone = _lonely(corners, sizes, len(on))
+    ends = _on_rim(cell, on)
+    alone &= ~(ends[corners] & ends[corners[after]])
+    onward = dict(zip(corners[after[alone]].tolist(), corners[alone].tolist(), strict=True))
+    if len(onward) != int(alone.sum()):
+        raise TopologyError("two holes between the polygons share a point; split it into two")
+    out: list[list[int]] = []
+    while onward:
+        first, at = next(iter(onward.items()))
+        ring = [first]
+        while at != first:
+            ring.append(at)
+            if at not in onward:
+                raise TopologyError("a hole between the polygons ends on the rim; close it along the rim")
+            at = onward.pop(at)
+        onward.pop(first, None)
+        out.append(ring)
+    return out
+
+
+def _one_exterior(network: CellNetwork, place: int, chi: int) -> CellNetwork:
+    """The bubbles from ``place`` on as one, with the Euler characteristic that is left for it."""
+    bubble = np.minimum(network.bubble, place)
+    euler = np.ones(place + 1, dtype=np.int64)
+    euler[place] = chi - (network.euler_characteristic - (network.n_bubbles - place))
+    return CellNetwork(network.next, network.origin, bubble, euler)
 
 
 def _projected(cell: HeleShawCell, points: Floats, used: Ints, allowed: float) -> Floats:
@@ -230,18 +338,22 @@ def _turned(cell: HeleShawCell, points: Floats, corners: Ints, sizes: Ints) -> b
     return bool(np.sign(np.einsum("nx,nx->n", vector, normal)).sum() < 0.0)
 
 
-def _check_degrees(corners: Ints, sizes: Ints, points: Floats) -> None:
+def _check_degrees(rings: Sequence[Sequence[int]], points: Floats, on_rim: Bools) -> None:
+    sizes = np.array([len(ring) for ring in rings])
+    corners = np.concatenate([np.asarray(ring) for ring in rings])
     starts = np.cumsum(sizes) - sizes
     after = np.arange(len(corners)) + 1
     after[starts + sizes - 1] = starts
     ends = np.sort(np.stack([corners, corners[after]], axis=1), axis=1)
     keys, count = np.unique(ends, axis=0, return_counts=True)
-    if (count != 2).any():
-        a, b = keys[np.flatnonzero(count != 2)[0]].tolist()
+    # once along a wall
+    bad_edge = (count != 2) & ~((count == 1) & on_rim[keys].all(axis=1))
+    if bad_edge.any():
+        a, b = keys[np.flatnonzero(bad_edge)[0]].tolist()
         raise TopologyError(
             f"the edge from {points[a].round(6).tolist()} to {points[b].round(6).tolist()} has "
-            f"{int(count[count != 2][0])} polygons beside it; the polygons must close the surface, two at "
-            "every edge"
+            f"{int(count[bad_edge][0])} polygons beside it; the polygons must close the surface, two at "
+            "every edge (exterior='holes' if they are open clusters)"
         )
     degree = np.bincount(keys.ravel(), minlength=len(points))
     if ((degree != 2) & (degree != 3)).any():
@@ -252,8 +364,8 @@ def _check_degrees(corners: Ints, sizes: Ints, points: Floats) -> None:
         )
 
 
-def _merged(network: CellNetwork) -> tuple[CellNetwork, Ints, Ints, Ints, Ints]:
-    """The network without its markers.
+def _merged(network: CellNetwork, marked: Bools) -> tuple[CellNetwork, Ints, Ints, Ints, Ints]:
+    """The network without its markers, but for those that are ``marked``.
 
     Returns
     -------
@@ -263,7 +375,7 @@ def _merged(network: CellNetwork) -> tuple[CellNetwork, Ints, Ints, Ints, Ints]:
     films, inner, places : (m,) arrays of int
         Film, old vertex, and place along the film (from 1) of each point between.
     """
-    corner = network.vertex_degrees == 3
+    corner = (network.vertex_degrees != 2) | marked
     halves = len(network.next)
     start = corner[network.origin]
     lonely = np.ones(network.n_bubbles, dtype=bool)

@@ -60,7 +60,8 @@ def write_obj(path: PathLike, foam: Foam, *, curve_points: int | None = None) ->
     disk = foam.network.bubble_euler[bubble] == 1
     ends = np.cumsum(sizes)
     with atomic_text(target) as stream:
-        stream.write("# cell network of a foam between curved plates, written by warpedfoam\no foam\n")
+        stream.write("# cell network of a foam between curved plates, written by warpedfoam\n")
+        stream.write(f"# vertices 1 to {foam.network.n_vertices} are the foam's\no foam\n")
         stream.writelines(f"v {x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
         places = (corners + 1).tolist()
         ids = foam.bubble_ids[bubble].tolist()

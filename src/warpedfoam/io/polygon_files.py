@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from warpedfoam.arrays import Floats
 from warpedfoam.errors import FileFormatError
 
-Polygons = tuple[Floats, list[list[int]]]
+#: Points, polygons, and how many of the first points are vertices of a foam (0: not told).
+Polygons = tuple[Floats, list[list[int]], int]
+
+#: A comment in the files of `write_ply` (from 0) and `write_obj` (from 1): which points are vertices.
+_VERTICES = re.compile(r"vertices ([01]) to (\d{1,9}) are the foam's")
 
 _KINDS = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -15,6 +21,9 @@ _KINDS = {
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
+#: The end of a PLY header, on a line of its own, and the byte order mark of some editors.
+_END = re.compile(rb"[\r\n]end_header[ \t]*(?:\r\n|\n|\r|$)")
+_MARK = b"\xef\xbb\xbf"
 _LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -41,7 +50,12 @@ def obj_polygons(data: bytes) -> Polygons:
                 polygons.append([p - 1 if p > 0 else len(points) + p if p else -1 for p in places])
         except ValueError as fault:
             raise FileFormatError(f"line {number} cannot be understood ({fault})") from None
-    return np.array(points, dtype=np.float64).reshape(-1, 3), polygons
+    return np.array(points, dtype=np.float64).reshape(-1, 3), polygons, _told(_text(data))
+
+
+def _told(text: str) -> int:
+    found = _VERTICES.search(text)
+    return int(found[2]) + 1 - int(found[1]) if found else 0
 
 
 def ply_polygons(data: bytes) -> Polygons:
@@ -52,17 +66,18 @@ def ply_polygons(data: bytes) -> Polygons:
     FileFormatError
         If the header or the body cannot be understood, or the file ends too early.
     """
-    head, mark, body = data.partition(b"end_header")
-    if not mark or not data.startswith(b"ply"):
+    data = data.removeprefix(_MARK)
+    end = _END.search(data)
+    if end is None or not data.startswith(b"ply"):
         raise FileFormatError("it is no PLY file, or its header does not end")
-    body = body[2:] if body.startswith(b"\r\n") else body[1:]
+    head, body = data[: end.start()], data[end.end() :]
     form, elements = _header(_text(head))
     if form == "ascii":
         words = _text(body).split()
         if len(words) > 0 and elements:
-            return _walk_words(words, elements)
+            return *_walk_words(words, elements), _told(_text(head))
         raise FileFormatError("it has no body")
-    return _walk_bytes(body, elements, "<" if form == "binary_little_endian" else ">")
+    return *_walk_bytes(body, elements, "<" if form == "binary_little_endian" else ">"), _told(_text(head))
 
 
 Property = tuple[str, str, str | None]
@@ -86,6 +101,8 @@ def _header(text: str) -> tuple[str, list[Element]]:
                     raise ValueError(f"{count} elements")
                 elements.append((words[1], count, []))
             elif words[0] == "property" and words[1] == "list":
+                if _KINDS[words[2]].startswith("f"):
+                    raise ValueError("a list's length is no whole number")
                 elements[-1][2].append((words[4], _KINDS[words[3]], _KINDS[words[2]]))
             elif words[0] == "property":
                 elements[-1][2].append((words[2], _KINDS[words[1]], None))
@@ -98,7 +115,7 @@ def _header(text: str) -> tuple[str, list[Element]]:
     return form, elements
 
 
-def _walk_words(words: list[str], elements: list[Element]) -> Polygons:
+def _walk_words(words: list[str], elements: list[Element]) -> tuple[Floats, list[list[int]]]:
     points, polygons = np.zeros((0, 3)), [[0][:0]]
     polygons.clear()
     at = 0
@@ -130,7 +147,7 @@ def _walk_words(words: list[str], elements: list[Element]) -> Polygons:
     return points, polygons
 
 
-def _walk_bytes(body: bytes, elements: list[Element], order: str) -> Polygons:
+def _walk_bytes(body: bytes, elements: list[Element], order: str) -> tuple[Floats, list[list[int]]]:
     points = np.zeros((0, 3))
     polygons: list[list[int]] = []
     at = 0
@@ -172,7 +189,7 @@ def _axes(properties: list[Property]) -> list[int]:
 
 
 def _text(data: bytes) -> str:
-    try:
-        return data.decode("utf-8").replace("\r\n", "\n")
-    except UnicodeDecodeError:
-        raise FileFormatError("it is no text where text is expected") from None
+    """Text in whatever extension of ASCII: numbers and keywords are ASCII, comments are passed over."""
+    if b"\0\0" in data or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise FileFormatError("it is no text where text is expected")
+    return data.removeprefix(_MARK).decode("utf-8", errors="replace").replace("\r\n", "\n")

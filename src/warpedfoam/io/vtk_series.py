@@ -95,6 +95,8 @@ def write_pvd(
     moments = None if times is None else as_floats(times, "times", (None,)).tolist()
     if moments is not None and any(b <= a for a, b in pairwise(moments)):
         raise ValueError("times must rise from each foam to the next")
+    if isinstance(foams, Foam) or not isinstance(foams, Iterable):
+        raise TypeError(f"foams must be an iterable of Foams, got {type(foams).__name__}")
     folder = _folder(target)
     rows: list[str] = []
     for k, foam in enumerate(foams):

@@ -17,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from warpedfoam.arrays import Ints, as_choice, as_instance, as_integer
+from warpedfoam.arrays import Ints, as_choice, as_instance, as_integer, as_number
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path, atomic_text, writable_path
@@ -51,7 +51,8 @@ def write_vtp(
     of bubbles ``bubble`` (id), ``sides``, ``charge``, ``area``, ``volume``, ``gaussian_curvature``
     (mean) and ``pressure``; of films ``film``, ``left``, ``right`` (ids), ``length``, ``film_area``
     and ``pressure_jump``. Where a number has no meaning it is NaN or −1 (``charge``: 0). *Field data*: the
-    arrays of `warpedfoam.save`, named ``warpedfoam.…``, and ``TimeValue`` if a time is given.
+    arrays of `warpedfoam.save`, named ``warpedfoam.…`` (none where the surface is made of Python functions,
+    which no file can hold), and ``TimeValue`` if a time is given.
 
     Parameters
     ----------
@@ -95,11 +96,9 @@ def write_vtp(
     """
     target = writable_path(path, suffixes=(".vtp",))
     as_instance(foam, "foam", Foam)
-    arrays = arrays_of(foam)
-    state = {STATE + name: array for name, array in arrays.items()}
-    state[STATE + "checksum"] = np.array([_checksum(arrays)])
+    state = _stored(foam)
     if time is not None:
-        state["TimeValue"] = np.array([time], dtype=np.float64)
+        state["TimeValue"] = np.array([as_number(time, "time")])
     part = as_choice(parts, "parts", PARTS)
     filled = as_choice(fill, "fill", FILLS)
     default = 5 if foam.n_bubbles > 2000 else 9
@@ -161,6 +160,17 @@ def read_vtp(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
         raise FileFormatError(
             f"cannot read {source}: it is no VTP file or it is damaged ({fault})"
         ) from fault
+
+
+def _stored(foam: Foam) -> Arrays:
+    """The foam's arrays for the field data."""
+    try:
+        arrays = arrays_of(foam)
+    except TypeError:  # functions: there is still a picture
+        return {}
+    state = {STATE + name: array for name, array in arrays.items()}
+    state[STATE + "checksum"] = np.array([_checksum(arrays)])
+    return state
 
 
 def _nothing(like: NDArray[Any], count: int, name: str) -> NDArray[Any]:
@@ -230,7 +240,9 @@ def _state(root: ET.Element) -> Arrays:
         if name.startswith(STATE):
             arrays[name.removeprefix(STATE)] = _values(entry, name)
     if not arrays:
-        raise FileFormatError("it holds no foam of warpedfoam (to take polygons only: import_polygons)")
+        raise FileFormatError(
+            "it holds no foam: another program wrote it, or its surface is made of Python functions"
+        )
     if (
         arrays.get("next") is not None and "film_offsets" in arrays
     ):  # one column or none has no shape of its own

@@ -105,6 +105,9 @@ def write_view(
     words = _words(labels, len(frames))
     if title is not None and not isinstance(title, str):
         raise TypeError(f"title must be a string or None, got {type(title).__name__}")
+    for text in (title or "", *words):
+        if not text.isprintable() and any("\ud800" <= letter <= "\udfff" for letter in text):
+            raise ValueError(f"title and labels must be text that UTF-8 can hold, got {text!r}")
     segments, rings = detail(max(foam.n_bubbles for foam in frames), len(frames))
     drawn = [_meshes(foam, segments, rings) for foam in frames]
     scalars = bubble_scalars(frames, [meshes[0].curvature for meshes in drawn])
