@@ -136,6 +136,16 @@ def test_the_foam_of_the_how_to(surfaces: dict[str, Any]) -> None:
     assert surfaces["charges"][surfaces["waist"]].sum() < 0
 
 
+def test_the_page_on_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(ROOT / "docs" / "pictures.md")
+    assert {p.name for p in tmp_path.iterdir()} == {"foam.png", "map.svg", "column.pdf", "angles.png"}
+    text = (ROOT / "docs" / "pictures.md").read_text(encoding="utf-8")
+    for name in wf.__all__:
+        if name.startswith("plot_"):
+            assert f"`{name}`" in text
+
+
 def test_the_theory_page() -> None:
     space = run(ROOT / "docs" / "theory.md")
     films = [0.999517699, 1.000019111, 1.000791843]  # as printed on the page

@@ -5,44 +5,39 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Callable, Mapping
-from pathlib import PurePath
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
 from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
-from warpedfoam.cli.flags import Debug, Folder, Json, Quiet, Seed
+from warpedfoam.cli.examples import EXAMPLES, epilog
+from warpedfoam.cli.flags import OUTPUT, Color, Debug, Folder, Json, Picture, Quiet, Seed
+from warpedfoam.cli.foam_verbs import foam_verbs
+from warpedfoam.cli.groups import OneLine, SurfaceOrFile
 from warpedfoam.cli.motion_verbs import motion_verbs
 from warpedfoam.cli.progress import progress_bars
 from warpedfoam.cli.verbs import verbs
 
 app = typer.Typer(
+    cls=OneLine,
     help="Bubbles and foams trapped between curved plates.",
     epilog="Exit codes: 0 converged, 1 not converged (results written all the same), 2 bad input, "
-    "3 a fault of warpedfoam's own, 130 interrupted.",
+    "3 a fault of warpedfoam's own, 130 interrupted.\n\n"
+    + epilog("", *EXAMPLES[""], "warpedfoam --install-completion"),
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
-class SurfaceOrFile(TyperGroup):
-    """Takes the name of a mesh file where the name of a surface may stand."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """``foam thing.ply …`` is ``foam mesh thing.ply …``."""
-        if args and args[0] not in self.commands and PurePath(args[0]).suffix:
-            args = ["mesh", *args]
-        return super().resolve_command(ctx, args)
-
-
 foam_app = typer.Typer(
     cls=SurfaceOrFile,
     help="Build and relax a foam on a surface given here: its name, or that of a mesh file (foam thing.ply).",
+    epilog=epilog("foam"),
     no_args_is_help=True,
 )
 app.add_typer(foam_app, name="foam")
+app.add_typer(foam_verbs)
 app.add_typer(verbs)
 app.add_typer(motion_verbs)
 
@@ -59,7 +54,6 @@ Volumes = Annotated[
 ]
 Order = Annotated[int, typer.Option("--order", help="Polynomial order of the films.")]
 T1 = Annotated[bool, typer.Option("--t1/--no-t1", help="Let films turn (T1) while relaxing.")]
-Color = Annotated[str, typer.Option("--color-by", help="Colour by charge, pressure, sides or area.")]
 
 
 def _print_version(wanted: bool) -> None:
@@ -81,10 +75,10 @@ def _common(version: Version = False) -> None:
     pass  # the option's callback has done the work
 
 
-@app.command()
+@app.command(epilog=epilog("run"))
 def run(
     file: Annotated[str, typer.Argument(help="TOML file of options.", metavar="FOAM.TOML")],
-    out: Annotated[str | None, typer.Option("-o", "--out", help="Folder for the results.")] = None,
+    out: Annotated[str | None, typer.Option(*OUTPUT, help="Folder for the results.")] = None,
     sets: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Replace an option, such as foam.n_bubbles=500."),
@@ -112,6 +106,7 @@ def run(
 potential_app = typer.Typer(
     cls=SurfaceOrFile,
     help="Map the energy of one bubble over its place on a surface, given as for foam.",
+    epilog=epilog("potential"),
     no_args_is_help=True,
 )
 app.add_typer(potential_app, name="potential")
@@ -164,7 +159,11 @@ def _add_command(
     command.__doc__ = about
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {p.name: p.annotation for p in parameters}
-    group.command(name=kind.replace("_", "-"))(command)
+    what = "potential" if "volume" in shared else "foam"
+    name = kind.replace("_", "-")
+    given = "data/double_torus.ply" if kind == "mesh" else name
+    options = "--volume 0.5 --gap 0.5" if what == "potential" else "-n 200 --gap 0.5 --seed 1"
+    group.command(name=name, epilog=epilog("", f"warpedfoam {what} {given} {options} -o out/"))(command)
 
 
 def _potential_run(surface: dict[str, Any], given: Mapping[str, Any]) -> None:
@@ -211,7 +210,7 @@ POTENTIAL: Mapping[str, tuple[Any, Any]] = {
         None,
     ),
     "layers": (Annotated[int, typer.Option("--layers", help="Layers of free films, 2 to 12.")], 4),
-    "picture": (Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the potential.")], True),
+    "picture": (Picture, True),
     "out": (Folder, "out"),
     "as_json": (Json, False),
     "quiet": (Quiet, False),

@@ -98,10 +98,11 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
         progress=progress,
     )
     clock.append(time.perf_counter())
-    outputs = _write_outputs(folder, relaxed, options, progress)
+    output = options.output
+    outputs = write_foam(folder, relaxed, color_by=output.color_by, picture=output.picture, progress=progress)
     clock.append(time.perf_counter())
     record = {
-        **_results(start, relaxed),
+        **results(start, relaxed),
         "timings": {
             **dict(zip(("build", "relax", "write"), np.diff(clock).tolist(), strict=True)),
             "relax_parts": dict(relaxed.timings),
@@ -113,7 +114,7 @@ def run_job(options: Options, progress: Progress = silent) -> Job:
         "command": sys.argv,
         "outputs": {name: str(path) for name, path in outputs.items()},
     }
-    record = _plain(record)
+    record = plain(record)
     write_record(folder / RECORD, record)
     progress("write", 1.0)
     return Job(relaxed, record)
@@ -127,16 +128,19 @@ def _tidy(folder: Path) -> None:
                 part.unlink(missing_ok=True)
 
 
-def _write_outputs(
-    folder: Path, relaxed: Relaxation, options: Options, progress: Progress
+def write_foam(
+    folder: Path, relaxed: Relaxation, *, color_by: str, picture: bool, progress: Progress
 ) -> dict[str, Path]:
+    """Write a relaxed foam in every format of the main job; an earlier record is removed first.
+
+    Without a picture, one of an earlier run is removed.
+    """
     from warpedfoam.io import save, write_bubbles_csv, write_films_csv, write_ply
 
     foam = relaxed.foam
     (folder / RECORD).unlink(missing_ok=True)
     _tidy(folder)
     progress("write", 0.0)
-    color_by = options.output.color_by
     ply, view = write_ply(folder / "foam.ply", foam, color_by=color_by)
     progress("write", 0.3)
     paths = {"ply": Path(ply), "view": Path(view)}
@@ -148,19 +152,20 @@ def _write_outputs(
         write(folder / file, foam)
         paths[name] = folder / file
     progress("write", 0.5)
-    picture = folder / "foam.png"
-    if options.output.picture:
+    drawn = folder / "foam.png"
+    if picture:
         from warpedfoam.plot import save_picture
 
         title = None if relaxed.converged else f"NOT CONVERGED: {foam.n_bubbles} bubbles"
-        save_picture(picture, foam, color_by=color_by, title=title)
-        paths["picture"] = picture
+        save_picture(drawn, foam, color_by=color_by, title=title)
+        paths["picture"] = drawn
     else:
-        picture.unlink(missing_ok=True)
+        drawn.unlink(missing_ok=True)
     return {**paths, "record": folder / RECORD}
 
 
-def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
+def results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
+    """Numbers of a relaxation and its foam, for a record."""
     from warpedfoam.analysis import equilibrium_report, honeycomb_bound, side_distribution
 
     foam = relaxed.foam
@@ -201,16 +206,16 @@ def _results(start: Foam, relaxed: Relaxation) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Turn numpy numbers into Python's, NaN and infinities into None, so that any reader takes the JSON."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

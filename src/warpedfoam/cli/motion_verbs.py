@@ -8,15 +8,16 @@ from typing import Annotated
 import typer
 
 from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, signals
-from warpedfoam.cli.flags import Debug, Folder, Json, Quiet
+from warpedfoam.cli.examples import epilog
+from warpedfoam.cli.flags import Color, Debug, Folder, FoamFile, Frame, Json, Picture, Quiet
 from warpedfoam.cli.progress import progress_bars
 
 motion_verbs = typer.Typer()
 
 
-@motion_verbs.command()
+@motion_verbs.command(epilog=epilog("drift"))
 def drift(
-    file: Annotated[str, typer.Argument(help="A foam: NPZ, VTP or HDF5 of warpedfoam.", metavar="FOAM")],
+    file: FoamFile,
     duration: Annotated[float, typer.Option("--duration", help="Time to cover.")],
     friction: Annotated[
         float, typer.Option("--friction", help="Friction of the films, force per area and velocity.")
@@ -40,18 +41,12 @@ def drift(
         int | None, typer.Option("--order", help="Polynomial order of the films; the foam's if left out.")
     ] = None,
     t1: Annotated[bool, typer.Option("--t1/--no-t1", help="Let films turn (T1) on the way.")] = True,
-    frame: Annotated[
-        int, typer.Option("--frame", help="Frame of a trajectory to start from; -1 is the last.")
-    ] = -1,
+    frame: Frame = -1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where an earlier run was stopped.")] = False,
     out: Folder = "out",
-    picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Draw frames and the energy against time.")
-    ] = True,
+    picture: Picture = True,
     animation: Annotated[bool, typer.Option("--animation", help="Write an animation too (GIF).")] = False,
-    color_by: Annotated[
-        str, typer.Option("--color-by", help="Colour by charge, pressure, sides or area.")
-    ] = "charge",
+    color_by: Color = "charge",
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,

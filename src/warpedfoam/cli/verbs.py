@@ -8,18 +8,19 @@ from typing import Annotated
 import typer
 
 from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
-from warpedfoam.cli.flags import Debug, Folder, Json, Quiet, Seed
+from warpedfoam.cli.examples import epilog
+from warpedfoam.cli.flags import OUTPUT, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet, Seed
 from warpedfoam.cli.progress import progress_bars
 
 verbs = typer.Typer()
 
 
-@verbs.command()
+@verbs.command(epilog=epilog("figures"))
 def figures(
     which: Annotated[
         str, typer.Argument(help="paper: the paper's figures and two new ones.", metavar="paper")
     ],
-    out: Annotated[str, typer.Option("-o", "--out", help="Folder for the figures.")] = "figs",
+    out: Annotated[str, typer.Option(*OUTPUT, help="Folder for the figures.")] = "figs",
     only: Annotated[
         list[str] | None, typer.Option("--only", help="One figure, such as torus; may be repeated.")
     ] = None,
@@ -45,7 +46,7 @@ def figures(
             print(json.dumps(facts, allow_nan=False) if as_json else told(facts), flush=True)
 
 
-@verbs.command()
+@verbs.command(epilog=epilog("check"))
 def check(
     file: Annotated[str, typer.Argument(help="Triangle mesh: PLY, OBJ, STL, OFF, GLB.", metavar="MESH")],
     gap: Annotated[
@@ -58,6 +59,7 @@ def check(
         str | None, typer.Option("--repair", metavar="FILE", help="Write a safely repaired mesh (PLY).")
     ] = None,
     as_json: Json = False,
+    quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
     """Tell what is wrong with a mesh and what to do; exit code 1 if it cannot carry a foam."""
@@ -65,21 +67,22 @@ def check(
         from warpedfoam.cli.checking import check_file
 
         sound, text, facts = check_file(file, gap=gap, n_bubbles=n_bubbles, repair=repair)
-        print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+        if as_json or not quiet:
+            print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
     if not sound:
         raise typer.Exit(NOT_CONVERGED)
 
 
-@verbs.command()
+@verbs.command(epilog=epilog("defects"))
 def defects(
     file: Annotated[str, typer.Argument(help="A saved foam: foam.npz.", metavar="FOAM.NPZ")],
     out: Annotated[
-        str | None, typer.Option("-o", "--out", help="Folder for the results; the foam's own if left out.")
+        str | None, typer.Option(*OUTPUT, help="Folder for the results; the foam's own if left out.")
     ] = None,
     tiny: Annotated[
         float, typer.Option("--tiny", help="Flag films shorter than this many bubble sizes.")
     ] = 0.1,
-    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the defects.")] = True,
+    picture: Picture = True,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -94,15 +97,13 @@ def defects(
         elif not quiet:
             from rich.console import Console
 
-            Console(highlight=False).print(summary_tables(found, facts))
-            print(summary_text(facts), flush=True)
+            console = Console(highlight=False)
+            with console.capture() as tables:  # rich has its own way with a reader that has gone
+                console.print(summary_tables(found, facts))
+            print(tables.get() + summary_text(facts), flush=True)
 
 
-FoamFile = Annotated[str, typer.Argument(help="A foam: NPZ, VTP or HDF5 of warpedfoam.", metavar="FOAM")]
-Frame = Annotated[int, typer.Option("--frame", help="Frame of a trajectory, from 0; -1 is the last.")]
-
-
-@verbs.command()
+@verbs.command(epilog=epilog("convert"))
 def convert(
     file: FoamFile,
     targets: Annotated[
@@ -114,7 +115,10 @@ def convert(
         ),
     ],
     color_by: Annotated[
-        str | None, typer.Option("--color-by", help="Colour PLY and GLB by charge, pressure, sides or area.")
+        str | None,
+        typer.Option(
+            "--color-by", help="Colour PLY and GLB by charge, pressure, sides, area, volume or curvature."
+        ),
     ] = None,
     frame: Frame = -1,
     as_json: Json = False,
@@ -130,24 +134,31 @@ def convert(
             print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
 
 
-@verbs.command()
-def info(file: FoamFile, frame: Frame = -1, as_json: Json = False, debug: Debug = False) -> None:
+@verbs.command(epilog=epilog("info"))
+def info(
+    file: FoamFile,
+    frame: Frame = -1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
     """Tell what foam is in a file: surface, bubbles, sides, energy."""
     with ending_well(debug), signals():
         from warpedfoam.cli.converting import info as told
 
         text, facts = told(file, frame=frame)
-        print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
+        if as_json or not quiet:
+            print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
 
 
-@verbs.command()
+@verbs.command(epilog=epilog("view"))
 def view(
     files: Annotated[
         list[str],
         typer.Argument(help="Saved foams (foam.npz); several make a trajectory.", metavar="FOAM.NPZ..."),
     ],
     out: Annotated[
-        str | None, typer.Option("-o", "--out", help="HTML file; beside the first foam if left out.")
+        str | None, typer.Option(*OUTPUT, help="HTML file; beside the first foam if left out.")
     ] = None,
     color_by: Annotated[
         str,
@@ -172,10 +183,10 @@ def view(
             print(f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser", flush=True)
 
 
-@verbs.command()
+@verbs.command(epilog=epilog("ensemble"))
 def ensemble(
     file: Annotated[str, typer.Argument(help="TOML file of a study.", metavar="STUDY.TOML")],
-    out: Annotated[str, typer.Option("-o", "--out", help="Folder for the results; goes on there.")] = "out",
+    out: Annotated[str, typer.Option(*OUTPUT, help="Folder for the results; goes on there.")] = "out",
     workers: Annotated[
         int | None, typer.Option("--workers", help="Processes on this machine; 0: none but this one.")
     ] = None,
@@ -207,7 +218,7 @@ def ensemble(
         raise typer.Exit(NOT_CONVERGED)
 
 
-@verbs.command()
+@verbs.command(epilog=epilog("partition"))
 def partition(
     surface: Annotated[
         str, typer.Argument(help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE")
@@ -220,7 +231,7 @@ def partition(
     hops: Annotated[int, typer.Option("--hops", help="Moves tried from each start.")] = 20,
     seed: Seed = 0,
     out: Folder = "out",
-    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw the partition.")] = True,
+    picture: Picture = True,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,

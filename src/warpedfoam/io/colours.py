@@ -40,7 +40,8 @@ class BubbleColours:
     limits : (float, float)
         Values at the ends of the ramp.
     inside : (n_bubbles,) array of bool
-        False for what is no disk (the exterior of a cluster) or has no value: grey, left out of the limits.
+        False for the exterior of clusters, and for what is no disk or has no value: grey, without a share
+        in the limits.
     kind : {"charge", "counted", "ramp", "diverging"}
         The first two have a legend with counts, the others a colour bar.
     """
@@ -69,6 +70,9 @@ def bubble_colours(
     """
     as_instance(foam, "foam", Foam)
     inside = foam.network.bubble_euler == 1
+    if foam.exterior is not None:
+        # on a sphere it is a disk, but no bubble all the same
+        inside = inside & (np.arange(foam.n_bubbles) != foam.exterior)
     if not inside.any():
         inside = np.ones_like(inside)
     if isinstance(color_by, str):

@@ -4,6 +4,7 @@ from warpedfoam.plot.charted import Charted
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
 from warpedfoam.plot.drift_picture import animate, plot_drift
+from warpedfoam.plot.foam_3d import plot_foam_3d
 from warpedfoam.plot.foam_picture import plot_foam, save_figure, save_picture
 from warpedfoam.plot.histograms import plot_histogram
 from warpedfoam.plot.histories import plot_annealing, plot_potential_path, plot_relaxation
@@ -31,6 +32,7 @@ __all__ = [
     "plot_defects",
     "plot_drift",
     "plot_foam",
+    "plot_foam_3d",
     "plot_histogram",
     "plot_map",
     "plot_order",

@@ -361,5 +361,5 @@ def heading(foam: Foam) -> str:
     name = type(foam.cell.surface).__name__
     kind = PROPER.get(name) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     article = "an" if kind[0] in "aeiou" else "a"
-    count = int((foam.network.bubble_euler == 1).sum())
+    count = foam.n_bubbles - (foam.exterior is not None)
     return f"{count} bubble{'' if count == 1 else 's'} on {article} {kind} · energy {foam.energy:.6g}"
