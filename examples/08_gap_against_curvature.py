@@ -2,7 +2,7 @@
 
 On the paper's torus (R = 20, r = 4, gap 0.5) a bubble of volume 0.5 drifts to the outer equator. An outer
 tube shifted outwards by a widens the gap there by about a cos φ, and the bubble prefers narrow places. The
-paper balances both where |δd| = |GV/3π|; theory of second order and the computed film say how much that is off.
+paper balances both where |δd| = |GV/3π|; second-order theory and the computed film say how much that is off.
 
     python examples/08_gap_against_curvature.py
 """

@@ -9,7 +9,7 @@ import typer
 
 from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, signals
 from warpedfoam.cli.examples import epilog
-from warpedfoam.cli.flags import Color, Debug, Folder, FoamFile, Frame, Json, Picture, Quiet
+from warpedfoam.cli.flags import Color, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet
 from warpedfoam.cli.progress import progress_bars
 
 motion_verbs = typer.Typer()
