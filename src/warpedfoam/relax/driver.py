@@ -52,8 +52,8 @@ LEAST_STEP = 0.01
 DRAFT = 0.03
 #: Residual below which a wrong inertia means a saddle, and how far to step down from it, in ℓ.
 SADDLE, KICK = 1e-6, 0.05
-#: Least share of exact steps that go to and fro.
-LEAST_DAMPING = 1.0 / 16.0
+#: Least share of exact steps that go to and fro, and how often in a row before they are shortened.
+LEAST_DAMPING, PATIENCE = 1.0 / 16.0, 2
 SLIPPED = (
     "stopped: the volumes no longer add up, so a film has slipped round the surface or a bubble has turned "
     "inside out; use more bubbles, volumes that differ less, or more marker vertices"
@@ -84,6 +84,7 @@ class _Run:
     past: float = np.inf
     last: np.ndarray = field(default_factory=lambda: np.zeros(0))
     damping: float = 1.0
+    backs: int = 0
 
     def snapshot(self) -> tuple[object, ...]:
         """What `restore` brings back."""
@@ -440,7 +441,9 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
     # markers make the matrix inexact: where that throws soft modes to and fro, shorter steps land between
     back = run.last.shape == step.vertices.shape and now.force > 0.3 * run.past
     back = back and _cosine(step.vertices, run.last) < -0.5
-    run.damping = max(0.5 * run.damping, LEAST_DAMPING) if back else min(2.0 * run.damping, 1.0)
+    run.backs = run.backs + 1 if back else 0
+    halve = run.backs >= PATIENCE
+    run.damping = max(0.5 * run.damping, LEAST_DAMPING) if halve else min(2.0 * run.damping, 1.0)
     share *= run.damping
     run.past, run.last = now.force, step.vertices
     _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
