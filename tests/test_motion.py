@@ -405,3 +405,11 @@ def test_a_grain_that_vanishes_ends_the_run() -> None:
     assert "bubble 0 has all but vanished" in moved.message
     # a flat circle lives for A λ/(2πγ)
     assert moved.times[-1] == pytest.approx(0.05 / 0.5 / (2.0 * np.pi), rel=0.1)
+
+
+def test_a_fixed_step_that_is_too_long_is_shortened() -> None:
+    moved = wf.drift(one_bubble(order=4), duration=4e3, every=4e3, step=4e3, method="euler")
+    assert moved.completed
+    assert moved.n_rejected > 0
+    assert moved.n_steps > 1
+    assert (np.diff(moved.step_energies) < 0.0).all()

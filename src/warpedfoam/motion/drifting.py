@@ -376,7 +376,8 @@ def _step(run: _Run, target: float) -> None:
         # two equal steps rather than a long and a tiny one
         time = left if run.step >= left else 0.5 * left if run.step > 0.5 * left else run.step
         if options.step is not None:
-            time = left if options.step > left * (1.0 - 1e-9) else min(options.step, run.step)
+            time = min(options.step, run.step)
+            time = left if time > left * (1.0 - 1e-9) else time
         if time < LEAST * run.stepper.time_scale:
             run.fault = TOO_SHORT.format(time=run.time, fault=run.fault or "tolerance")
             return
@@ -403,7 +404,9 @@ def _step(run: _Run, target: float) -> None:
         run.bound = min(LIFT * run.bound, 1e300)
         run.step = min(max(time * factor, run.step if time < run.step else 0.0), run.bound)
     else:
-        run.step = options.step
+        # one that had to be shortened finds its length again by and by
+        whole = time >= options.step or time == left
+        run.step = options.step if whole else min(options.step, GROW * time)
     before, energy = run.state, run.log[-1][1]
     run.time = target if time == left else run.time + time
     run.count += 1
