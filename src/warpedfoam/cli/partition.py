@@ -40,7 +40,7 @@ def search(
     sizes : sequence of str
         ``name=value`` each.
     """
-    chosen = _surface(surface, sizes)
+    chosen = surface_options(surface, sizes)
     folder = Path(out)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -91,7 +91,8 @@ def _numbers(values: list[float | None]) -> np.ndarray:
     return np.array([np.nan if v is None else v for v in values])
 
 
-def _surface(name: str, sizes: Sequence[str]) -> SurfaceOptions:
+def surface_options(name: str, sizes: Sequence[str]) -> SurfaceOptions:
+    """A surface from its kind or the name of a mesh file, and ``name=value`` sizes."""
     table: dict[str, Any] = {"kind": name}
     if PurePath(name).suffix:
         table = {"kind": "mesh", "file": name}

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Okabe and Ito's colours: told apart by colour-blind readers.
-_BLUE, _ORANGE, _GREEN, _GREY = "#0072b2", "#d55e00", "#009e73", "#7f7f7f"
+BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#7f7f7f"
 
 
 def plot_sides(statistics: FoamStatistics) -> Figure:
@@ -27,22 +27,22 @@ def plot_sides(statistics: FoamStatistics) -> Figure:
         If ``statistics`` is not a `FoamStatistics`.
     """
     s = as_instance(statistics, "statistics", FoamStatistics)
-    figure, (left, middle, right) = _panels(3)
+    figure, (left, middle, right) = panels(3)
     rgb = charge_rgb((6 - s.sides).astype(np.float64)) / 255.0
     left.bar(s.sides, s.fractions, color=rgb, edgecolor="#333333", linewidth=0.6)
-    _labels(left, "sides n", "fraction of bubbles P(n)", f"{s.n_bubbles} bubbles, μ₂ = {s.mu2:.3f}")
-    middle.plot(s.sides, s.sides * s.neighbour_sides, "o", color=_BLUE, label="measured")
+    labelled(left, "sides n", "fraction of bubbles P(n)", f"{s.n_bubbles} bubbles, μ₂ = {s.mu2:.3f}")
+    middle.plot(s.sides, s.sides * s.neighbour_sides, "o", color=BLUE, label="measured")
     if s.aboav is not None:
         law = (s.mean_sides - s.aboav) * s.sides + s.mean_sides * s.aboav + s.mu2
-        middle.plot(s.sides, law, "-", color=_ORANGE, label=f"Aboav–Weaire, a = {s.aboav:.2f}")
+        middle.plot(s.sides, law, "-", color=ORANGE, label=f"Aboav–Weaire, a = {s.aboav:.2f}")
     middle.legend(frameon=False)
-    _labels(middle, "sides n", "n · mean sides of neighbours m(n)", "neighbours")
-    right.plot(s.sides, s.area_by_sides, "o", color=_BLUE, label="measured")
+    labelled(middle, "sides n", "n · mean sides of neighbours m(n)", "neighbours")
+    right.plot(s.sides, s.area_by_sides, "o", color=BLUE, label="measured")
     if s.lewis is not None:
         law = 1.0 + s.lewis * (s.sides - s.mean_sides)
-        right.plot(s.sides, law, "-", color=_ORANGE, label=f"Lewis, slope {s.lewis:.3g}")
+        right.plot(s.sides, law, "-", color=ORANGE, label=f"Lewis, slope {s.lewis:.3g}")
     right.legend(frameon=False)
-    _labels(right, "sides n", "mean area / mean area of all", "areas")
+    labelled(right, "sides n", "mean area / mean area of all", "areas")
     for axes in (left, middle, right):
         axes.set_xticks(s.sides)
     return figure
@@ -57,24 +57,24 @@ def plot_correlations(found: Correlations) -> Figure:
         If ``found`` is not a `Correlations`.
     """
     c = as_instance(found, "found", Correlations)
-    figure, (left, middle, right) = _panels(3)
+    figure, (left, middle, right) = panels(3)
     some = c.pairs > 0
     s = c.distance[some] / c.spacing
     note = "" if c.n_foams == 1 else f", {c.n_foams} foams"
     for axes, values, colour, name in (
-        (left, c.g6[some], _BLUE, "orientation g6(s)"),
-        (middle, c.charge[some], _GREEN, "charge ⟨δ δ⟩(s) / ⟨δ²⟩"),
+        (left, c.g6[some], BLUE, "orientation g6(s)"),
+        (middle, c.charge[some], GREEN, "charge ⟨δ δ⟩(s) / ⟨δ²⟩"),
     ):
-        axes.axhline(0.0, color=_GREY, linewidth=0.8)
+        axes.axhline(0.0, color=GREY, linewidth=0.8)
         axes.plot(s, values, "o-", color=colour, markersize=4)
-        _labels(axes, "geodesic distance s / a", name, name.split()[0] + note)
-    right.axhline(0.0, color=_GREY, linewidth=0.8)
-    right.plot(c.edges / c.spacing, c.screening, "o-", color=_ORANGE, markersize=4)
+        labelled(axes, "geodesic distance s / a", name, name.split()[0] + note)
+    right.axhline(0.0, color=GREY, linewidth=0.8)
+    right.plot(c.edges / c.spacing, c.screening, "o-", color=ORANGE, markersize=4)
     if c.screening_length is not None:
         at = c.screening_length / c.spacing
-        right.axvline(at, color=_GREY, linestyle="--", label=f"S = 1/e at {at:.2f} a")
+        right.axvline(at, color=GREY, linestyle="--", label=f"S = 1/e at {at:.2f} a")
         right.legend(frameon=False)
-    _labels(right, "distance s / a", "charge within s, S(s)", "screening" + note)
+    labelled(right, "distance s / a", "charge within s, S(s)", "screening" + note)
     return figure
 
 
@@ -96,26 +96,24 @@ def plot_charge_profile(profile: ChargeProfile, *, coordinate: str = "coordinate
     """
     p = as_instance(profile, "profile", ChargeProfile)
     as_instance(coordinate, "coordinate", str)
-    figure, (left, right) = _panels(2)
+    figure, (left, right) = panels(2)
     middles = 0.5 * (p.edges[1:] + p.edges[:-1])
     wings = 0.5 * np.diff(p.edges)
     count = len(p.charges)
-    left.axhline(0.0, color=_GREY, linewidth=0.8)
-    left.stairs(p.region_curvature, p.edges, color=_ORANGE, linewidth=1.6, label="(3/π) ∫ G dA of the band")
+    left.axhline(0.0, color=GREY, linewidth=0.8)
+    left.stairs(p.region_curvature, p.edges, color=ORANGE, linewidth=1.6, label="(3/π) ∫ G dA of the band")
     left.errorbar(
-        middles, p.charge, p.charge_error, wings, "o", color=_BLUE, markersize=5, capsize=3, label="charge Q"
+        middles, p.charge, p.charge_error, wings, "o", color=BLUE, markersize=5, capsize=3, label="charge Q"
     )
-    left.plot(middles, p.curvature, "x", color=_GREEN, label="(3/π) ∫ G dA of its bubbles")
+    left.plot(middles, p.curvature, "x", color=GREEN, label="(3/π) ∫ G dA of its bubbles")
     left.legend(frameon=False)
     title = "1 foam, no error bars" if count == 1 else f"mean of {count} foams and its standard error"
-    _labels(left, coordinate, "charge in the band", title)
+    labelled(left, coordinate, "charge in the band", title)
     low, high = float(p.region_curvature.min()), float(p.region_curvature.max())
-    right.plot([low, high], [low, high], "-", color=_ORANGE, label="Q = (3/π) ∫ G dA")
-    right.errorbar(
-        p.region_curvature, p.charge, p.charge_error, fmt="o", color=_BLUE, markersize=5, capsize=3
-    )
+    right.plot([low, high], [low, high], "-", color=ORANGE, label="Q = (3/π) ∫ G dA")
+    right.errorbar(p.region_curvature, p.charge, p.charge_error, fmt="o", color=BLUE, markersize=5, capsize=3)
     right.legend(frameon=False)
-    _labels(right, "(3/π) ∫ G dA of the band", "charge Q", "charge against curvature")
+    labelled(right, "(3/π) ∫ G dA of the band", "charge Q", "charge against curvature")
     return figure
 
 
@@ -131,21 +129,22 @@ def plot_charge_energies(found: ChargeEnergies, *, coordinate: str = "f") -> Fig
     """
     e = as_instance(found, "found", ChargeEnergies)
     as_instance(coordinate, "coordinate", str)
-    figure, panels = _panels(2)
+    figure, both = panels(2)
     mine = (
         (e.placement, e.slope, e.slope_error, f"Σ q {coordinate}"),
         (e.spread, e.spread_slope, e.spread_slope_error, "Σ |q|"),
     )
-    for axes, (x, slope, error, name), (y, other, *_) in zip(panels, mine, mine[::-1], strict=True):
+    for axes, (x, slope, error, name), (y, other, *_) in zip(both, mine, mine[::-1], strict=True):
         rest = e.energies - other * (y - y.mean())
-        axes.plot(x, rest, "o", color=_BLUE, markersize=4)
+        axes.plot(x, rest, "o", color=BLUE, markersize=4)
         ends = np.array([x.min(), x.max()])
-        axes.plot(ends, 1.0 + slope * (ends - x.mean()), "-", color=_ORANGE)
-        _labels(axes, name, "energy / mean energy", f"slope {slope:.2g} ± {error:.1g}, {len(x)} foams")
+        axes.plot(ends, 1.0 + slope * (ends - x.mean()), "-", color=ORANGE)
+        labelled(axes, name, "energy / mean energy", f"slope {slope:.2g} ± {error:.1g}, {len(x)} foams")
     return figure
 
 
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
+def panels(count: int) -> tuple[Figure, list[Axes]]:
+    """A figure of so many plots in a row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -154,7 +153,8 @@ def _panels(count: int) -> tuple[Figure, list[Axes]]:
     return figure, [figure.add_subplot(1, count, k + 1) for k in range(count)]
 
 
-def _labels(axes: Axes, x: str, y: str, title: str) -> None:
+def labelled(axes: Axes, x: str, y: str, title: str) -> None:
+    """Names of both axes and a title."""
     axes.set_xlabel(x, fontsize=11)
     axes.set_ylabel(y, fontsize=11)
     axes.set_title(title, fontsize=11)

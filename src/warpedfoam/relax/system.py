@@ -33,6 +33,10 @@ STIFFNESS_FLOOR = 0.5
 INVARIANT = 1e-5
 
 
+#: A rigid motion of which held vertices leave less than this share is none.
+SLIDES = 0.05
+
+
 class Stopwatch:
     """Adds the seconds since it was last read to a kind of work."""
 
@@ -93,6 +97,8 @@ class System:
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
         self.exterior = exterior
+        # markers that follow their neighbours make Newton's steps inexact: near the end they stay
+        self.tight = False
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.mean_volume = float(targets.mean())
         if exterior is not None:
@@ -156,7 +162,7 @@ class Linearised:
         self.hessian[:, :4] *= system.length
         self.volume[:4] *= system.length
         self.force[:4] *= system.length
-        loose = system.exterior is not None
+        loose = system.exterior is not None and not system.tight
         held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=loose)
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
@@ -291,14 +297,15 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
         modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
+    whole = np.linalg.norm(matrix, axis=(1, 2))
     held = held_vertices(cell.surface, state.network, state.points, state.offsets)
     if held is not None:
         across = held.directions
         matrix[:, held.vertices] -= np.einsum("kmi,mi,mj->kmj", matrix[:, held.vertices], across, across)
     flat: Floats = matrix.reshape(len(modes), 2 * state.network.n_vertices)
-    # a motion along the films alone has nothing left
+    # a motion along the films alone, such as a lone bubble's turning, has next to nothing left
     size = np.linalg.norm(flat, axis=1)
-    kept: Floats = flat[size > 1e-6 * cell.surface.size]
+    kept: Floats = flat[(size > 1e-6 * cell.surface.size) & (size > SLIDES * whole)]
     return kept
 
 
