@@ -93,7 +93,7 @@ def main(folder: str | Path = "data") -> None:
         rows = energies("order", 7, 0.5, 0.5, ends, order=order)
         table += rows
         print(f"p = {order:2d}: E(0) = {rows[0]['energy']:.12f}  E(180) − E(0) = {difference(rows):.12f}")
-    for angle in np.arange(0.0, 61.0, 15.0):
+    for angle in np.arange(0.0, 91.0, 15.0):
         for n in (2, 7):
             options = {"hold": "both", "orientation": float(np.radians(angle))}
             table += energies("orientation", n, 0.5, 0.5, np.array([90.0]), **options)

@@ -26,6 +26,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "warpedfoam relax out/foam.npz --order 8 -o relaxed/",
         "warpedfoam relax out/foam.npz --layers 4 --no-t1 -o bulging/",
     ),
+    "cluster": (
+        "warpedfoam cluster torus -n 7 --volume 0.5 -o cluster/",
+        "warpedfoam cluster torus -n 19 --potential --places 13 -o potential/",
+    ),
     "drift": (
         "warpedfoam drift out/foam.npz --duration 10 -o drift/",
         "warpedfoam drift drift/drift.h5 --frame 0 --duration 20 --yield-friction 0.01 --animation -o slow/",

@@ -41,7 +41,7 @@ def search(
     sizes : sequence of str
         ``name=value`` each.
     """
-    chosen = _surface(surface, sizes)
+    chosen = surface_options(surface, sizes)
     folder = output_folder(out)
     built = chosen.build()
     found = minimal_partition(
@@ -89,7 +89,8 @@ def _numbers(values: list[float | None]) -> np.ndarray:
     return np.array([np.nan if v is None else v for v in values])
 
 
-def _surface(name: str, sizes: Sequence[str]) -> SurfaceOptions:
+def surface_options(name: str, sizes: Sequence[str]) -> SurfaceOptions:
+    """A surface from its kind or the name of a mesh file, and ``name=value`` sizes."""
     table: dict[str, Any] = {"kind": name}
     if PurePath(name).suffix:
         table = {"kind": "mesh", "file": name}

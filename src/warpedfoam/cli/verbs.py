@@ -256,3 +256,65 @@ def partition(
             print(json.dumps(facts, allow_nan=False), flush=True)
         elif not quiet:
             print(job.summary_text(facts), flush=True)
+
+
+@verbs.command(epilog=epilog("cluster"))
+def cluster(
+    surface: Annotated[
+        str, typer.Argument(help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE")
+    ],
+    n_bubbles: Annotated[
+        str, typer.Option("-n", "--n-bubbles", help="Bubbles of the cluster, or of several: 7,3.")
+    ] = "7",
+    size: Annotated[
+        list[str] | None, typer.Option("--size", metavar="NAME=VALUE", help="A size, such as radius=1.")
+    ] = None,
+    gap: Annotated[float, typer.Option("--gap", help="Distance of the plates.")] = 0.5,
+    volume: Annotated[float, typer.Option("--volume", help="Volume of each bubble.")] = 0.5,
+    centre: Annotated[
+        list[str] | None, typer.Option("--centre", metavar="X,Y,Z", help="Where; once for each cluster.")
+    ] = None,
+    orientation: Annotated[
+        float, typer.Option("--orientation", help="Angle of the long axis in degrees; up a tube is 0.")
+    ] = 0.0,
+    layout: Annotated[str, typer.Option("--layout", help="hexagonal or random.")] = "hexagonal",
+    seed: Seed = 0,
+    order: Annotated[int, typer.Option("--order", help="Polynomial order of the films, 2 to 24.")] = 8,
+    contacts: Annotated[
+        bool, typer.Option("--contacts/--no-contacts", help="Join outlines that meet, part what lets go.")
+    ] = True,
+    potential: Annotated[
+        bool, typer.Option("--potential", help="Hold it at places instead: its energy against where it is.")
+    ] = False,
+    places: Annotated[
+        int, typer.Option("--places", help="With --potential: on a torus from phi = 0 to 180, else all over.")
+    ] = 13,
+    out: Folder = "out",
+    picture: Picture = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Relax a cluster of bubbles in an otherwise empty cell, or measure its energy against its place."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli import clustering as job
+
+        with progress_bars(quiet=quiet) as report:
+            run = job.measure if potential else job.relaxed_cluster
+            facts = run(
+                surface,
+                size or [],
+                job.Given(
+                    n_bubbles, gap, volume, centre or [], orientation, layout, seed, order, contacts, places
+                ),
+                out=out,
+                picture=picture,
+                progress=report,
+            )
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(job.summary_text(facts), flush=True)
+    if not facts["converged"]:
+        say(f"did not converge: {facts['message']}; the results are marked as such")
+        raise typer.Exit(NOT_CONVERGED)

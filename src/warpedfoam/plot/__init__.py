@@ -1,6 +1,7 @@
 """Pictures; matplotlib is imported when the first one is drawn."""
 
 from warpedfoam.plot.charted import Charted
+from warpedfoam.plot.cluster_picture import plot_cluster_potential
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
 from warpedfoam.plot.drift_picture import animate, plot_drift
@@ -28,6 +29,7 @@ __all__ = [
     "plot_annealing",
     "plot_charge_energies",
     "plot_charge_profile",
+    "plot_cluster_potential",
     "plot_correlations",
     "plot_defects",
     "plot_drift",

@@ -22,8 +22,8 @@ from warpedfoam.relax.outlines import Facing, Outlines, facing, met, outlines, s
 #: Gaps, in sizes of the smaller bubble, at which outlines have met.
 WINDOW = (-0.03, 0.006)
 #: A film that holds a bubble to another is lost when it is shorter than the first, in sizes of the smaller
-#: bubble, and its neighbours pull it open with less than the second (2 would hold it at rest).
-LOOSE, HOLDS = 0.02, 2.0 - 1e-3
+#: bubble, and its neighbours do not pull it open, with less than the second: 2 is what holds it at rest.
+LOOSE, HOLDS = 0.02, 2.02
 #: Contacts made in all, times the number of films: more are made and lost without end.
 MOST = 1
 

@@ -34,6 +34,10 @@ STIFFNESS_FLOOR = 0.5
 INVARIANT = 1e-5
 
 
+#: A rigid motion of which held vertices leave less than this share is none.
+SLIDES = 0.05
+
+
 class Stopwatch:
     """Adds the seconds since it was last read to a kind of work."""
 
@@ -102,9 +106,10 @@ class System:
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
         self.exterior = exterior
-        # in open clusters markers follow their neighbours
-        self.loose = exterior is not None
         self.loads: Loads | None = None
+        # in open clusters markers follow their neighbours, which makes Newton's steps inexact: near the
+        # end they stay
+        self.loose, self.tight = exterior is not None, False
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.mean_volume = float(targets.mean())
         if exterior is not None:
@@ -170,7 +175,8 @@ class Linearised:
         self.force[:4] *= system.length
         if system.loads is not None:
             system.loads.add(state, self.force, self.hessian)
-        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=system.loose)
+        loose = system.loose and not system.tight
+        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=loose)
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
         if system.loads is None and (held is not None or not system.invariant):
@@ -304,14 +310,15 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
         modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
+    whole = np.linalg.norm(matrix, axis=(1, 2))
     held = held_vertices(cell.surface, state.network, state.points, state.offsets)
     if held is not None:
         across = held.directions
         matrix[:, held.vertices] -= np.einsum("kmi,mi,mj->kmj", matrix[:, held.vertices], across, across)
     flat: Floats = matrix.reshape(len(modes), 2 * state.network.n_vertices)
-    # a motion along the films alone has nothing left
+    # a motion along the films alone, such as a lone bubble's turning, has next to nothing left
     size = np.linalg.norm(flat, axis=1)
-    kept: Floats = flat[size > 1e-6 * cell.surface.size]
+    kept: Floats = flat[(size > 1e-6 * cell.surface.size) & (size > SLIDES * whole)]
     return kept
 
 

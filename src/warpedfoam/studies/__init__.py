@@ -13,6 +13,7 @@ from warpedfoam.studies.potential import (
     geometric_potential,
     write_potential_csv,
 )
+from warpedfoam.studies.soft_probe import ProbePotential, held_centre, probe_potential
 from warpedfoam.studies.study import Study, read_study
 from warpedfoam.studies.thomson import ThomsonPoints, thomson_points
 from warpedfoam.studies.warm_points import anneal_points
@@ -27,6 +28,7 @@ __all__ = [
     "GeometricPotential",
     "MinimalPartition",
     "PartitionTry",
+    "ProbePotential",
     "Study",
     "ThomsonPoints",
     "anneal",
@@ -38,7 +40,9 @@ __all__ = [
     "drift_path",
     "geodesic_circle",
     "geometric_potential",
+    "held_centre",
     "minimal_partition",
+    "probe_potential",
     "read_study",
     "run_ensemble",
     "thomson_points",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpedfoam.arrays import Floats, frozen
+from warpedfoam.arrays import Floats, Ints, frozen
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.periodic import nearest_image
@@ -15,7 +16,7 @@ from warpedfoam.relax.driver import EXACT_BELOW, SOFTNESS, VOLUME_STEP
 from warpedfoam.relax.held import held_vertices, moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
-from warpedfoam.relax.system import Linearised, State, Step, System, one_ring, rigid_modes
+from warpedfoam.relax.system import Linearised, State, Step, System, one_ring, pinned_unknowns, rigid_modes
 
 #: Order of the rays from the held point to the outer films, and by how much rays outnumber a film's nodes.
 RADIAL, MORE = 14, 6
@@ -36,11 +37,13 @@ class Hold:
     With the frame (e1, e2) at the point q the constraints are c_k = e_k · ∫ (x − q) w dA / V over the
     cluster, w = d + H d² + G d³/3 the volume per area, and, if ``arms`` (n_vertices, 2) are given,
     c_3 = Σ a × u / Σ |a|² with u the vertices' places in the frame: the mean turn away from the arms.
+    ``bubbles`` are those whose centre is held: all but the exterior by default.
     """
 
     point: Floats
     frame: Floats
     arms: Floats | None
+    bubbles: Ints | None = None
 
     @property
     def count(self) -> int:
@@ -53,7 +56,8 @@ class HeldCluster:
     """A cluster at rest under the constraints' forces.
 
     ``force`` (3,) is −∇E, tangent at the held point; ``torque`` −dE/dα by the orientation, NaN where it is
-    free; ``residual`` in γ d, ``displaced`` what is left of the constraints in ℓ.
+    free; ``residual`` in γ d, ``displaced`` what is left of the constraints in ℓ. Of several holds these
+    are the first one's; ``forces`` (k, 3) has all.
     """
 
     foam: Foam
@@ -64,23 +68,38 @@ class HeldCluster:
     converged: bool
     is_minimum: bool
     iterations: int
+    forces: Floats
 
 
-def outer_films(foam: Foam) -> tuple[np.ndarray, np.ndarray]:
-    """Films between the clusters and the exterior, and +1 where the cluster lies on their left, else −1."""
+def outer_films(foam: Foam, bubbles: Ints | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Films round ``bubbles`` (None: all but the exterior), and +1 where these lie on their left, else −1."""
     network = foam.network
-    outer = np.flatnonzero((network.left == foam.exterior) != (network.right == foam.exterior))
-    return outer, np.where(network.right[outer] == foam.exterior, 1.0, -1.0)
+    mine = np.zeros(network.n_bubbles, dtype=np.bool_)
+    if bubbles is None:
+        mine[:] = True
+        mine[foam.exterior] = False
+    else:
+        mine[bubbles] = True
+    outer = np.flatnonzero(mine[network.left] != mine[network.right])
+    return outer, np.where(mine[network.left[outer]], 1.0, -1.0)
 
 
-def volume_moment(foam: Foam, about: Floats) -> tuple[Floats, float]:
-    """∫ (x − q) w dA over the clusters of a foam, (3,), and their volume ∫ w dA, by one fan about q.
+def held_volume(foam: Foam, bubbles: Ints | None) -> float:
+    """What the volumes of ``bubbles`` are to add up to; of all but the exterior if None."""
+    if bubbles is not None:
+        return float(foam.target_volumes[bubbles].sum())
+    assert foam.exterior is not None
+    return float(np.delete(foam.target_volumes, foam.exterior).sum())
+
+
+def volume_moment(foam: Foam, about: Floats, bubbles: Ints | None = None) -> tuple[Floats, float]:
+    """∫ (x − q) w dA over some bubbles, (3,), and their volume ∫ w dA, by one fan about q.
 
     Rays run from q (3,) through the surface to the outer films; both directions are differentiated
     spectrally, so that any surface will do.
     """
     surface, layer = foam.cell.surface, foam.cell.layer
-    films, sign = outer_films(foam)
+    films, sign = outer_films(foam, bubbles)
     along, across = lobatto(foam.order + MORE), lobatto(RADIAL)
     tail, head = foam.film_ends
     curve = surface.arc_points(tail[films], head[films], foam.film_offsets[films], along.nodes)
@@ -103,7 +122,7 @@ def volume_moment(foam: Foam, about: Floats) -> tuple[Floats, float]:
 
 def constraints(foam: Foam, hold: Hold, volume: float) -> Floats:
     """c_1, c_2 in units of length, and c_3 if the orientation is held."""
-    moment, _ = volume_moment(foam, hold.point)
+    moment, _ = volume_moment(foam, hold.point, hold.bubbles)
     values = hold.frame @ moment / volume
     if hold.arms is None:
         return np.asarray(values)
@@ -130,7 +149,7 @@ def _gradients(foam: Foam, hold: Hold, volume: float, length: float) -> Floats:
     That of an integral over the cluster is ∮ f w δx · ν ds along its outline; δx by differences.
     """
     surface, network = foam.cell.surface, foam.network
-    films, sign = outer_films(foam)
+    films, sign = outer_films(foam, hold.bubbles)
     rule = lobatto(foam.order + MORE)
     offsets, tail = foam.film_offsets[films], foam.vertex_points[network.tails[films]]
     head = foam.vertex_points[network.heads[films]]
@@ -231,8 +250,10 @@ def _pins(foam: Foam, hold: Hold) -> np.ndarray:
     return np.asarray(qr(flat, mode="economic", pivoting=True)[2][:count])
 
 
-def relax_held(foam: Foam, hold: Hold, *, tolerance: float, max_iterations: int) -> HeldCluster:
-    """Newton's method on the foam's KKT system bordered by the constraints.
+def relax_held(
+    foam: Foam, hold: Hold | Sequence[Hold], *, tolerance: float, max_iterations: int
+) -> HeldCluster:
+    """Newton's method on the foam's KKT system bordered by the constraints of one hold or of several.
 
     The matrix is factored with stiffnesses on a few vertex unknowns, which fix the motions that the
     constraints forbid, and these are taken out again together with the border (Woodbury). Second
@@ -245,42 +266,50 @@ def relax_held(foam: Foam, hold: Hold, *, tolerance: float, max_iterations: int)
     scale = foam.tension * system.film_unit / system.mean_volume
     start = np.zeros(foam.n_bubbles) if foam.pressures is None else foam.pressures / scale
     state = State(network, foam.vertex_points, foam.film_offsets, start)
-    assert foam.exterior is not None
-    volume = float(np.delete(foam.target_volumes, foam.exterior).sum())
-    force = np.zeros(hold.count)
-    length, unit = system.length, np.ones(hold.count)
-    unit[:2] = length
+    holds = (hold,) if isinstance(hold, Hold) else tuple(hold)
+    volumes = [held_volume(foam, one.bubbles) for one in holds]
+    counts = [one.count for one in holds]
+    first = np.cumsum([0, *counts])
+    force, length = np.zeros(first[-1]), system.length
+    unit = np.concatenate([[length, length, 1.0][:count] for count in counts])
     iteration, now = 0, foam
     while True:
         lin = system.linearise(state)
         now = replace(
             foam, vertex_points=state.points, film_offsets=state.offsets, pressures=state.pressures * scale
         )
-        values = constraints(now, hold, volume) / unit
-        gradient = _gradients(now, hold, volume, length)
+        pairs = list(zip(holds, volumes, strict=True))
+        values = np.concatenate([constraints(now, one, volume) for one, volume in pairs]) / unit
+        gradient = np.concatenate([_gradients(now, one, volume, length) for one, volume in pairs])
         lin.rigid = _free_motions(now, state, gradient)
         loaded = lin.loaded(lin.force + np.einsum("c,cif->if", force, gradient))
         fault = float((np.abs(lin.volume_fault) / lin.system.shares).max())
         displaced = float(np.abs(values).max())
         done = loaded.residuals.force <= tolerance and max(fault, displaced) <= max(0.1 * tolerance, 1e-11)
         try:
-            step, change, is_minimum = _step(now, loaded, gradient, values, _pins(now, hold))
+            pins = _pins(now, holds[0])
+            if len(holds) > 1:
+                # what the first hold alone does not fix
+                pins = np.union1d(pins, pinned_unknowns(foam.cell, state))
+            step, change, is_minimum = _step(now, loaded, gradient, values, pins)
         except SingularMatrixError:
             step = None
         finite = step is not None and all(np.isfinite(a).all() for a in (step.vertices, step.offsets))
         if done or iteration >= max_iterations or not finite:
             # the full force of each constraint per length, not per bubble size
             real = force / unit * foam.tension * system.film_unit
-            pull, torque = _reaction(now, hold, volume, real)
+            parts = zip(holds, volumes, np.split(real, first[1:-1]), strict=True)
+            reactions = [_reaction(now, *part) for part in parts]
             return HeldCluster(
                 now,
-                frozen(pull),
-                torque,
+                frozen(reactions[0][0]),
+                reactions[0][1],
                 loaded.residuals.force,
                 displaced,
                 bool(done and finite),
                 bool(finite and is_minimum),
                 iteration,
+                frozen(np.array([pull for pull, _ in reactions])),
             )
         assert step is not None
         size = max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
@@ -302,7 +331,6 @@ def _step(
     network, shares = foam.network, lin.system.shares
     vertex = np.zeros(2 * network.n_vertices)
     pressure = np.zeros(network.n_bubbles)
-    assert foam.exterior is not None
     fault = lin.volume_fault
     rough = lin.residuals.force > EXACT_BELOW or float(np.abs(fault / shares).max()) > EXACT_BELOW
     if rough:
@@ -314,7 +342,7 @@ def _step(
         most = VOLUME_STEP * np.maximum(shares, lin.volumes)
         fault = np.clip(fault, -most, most)
     else:
-        pressure[foam.exterior] = 1.0
+        pressure[foam.exterior or 0] = 1.0
     vertex[pins] += 1.0
     condensed = lin.condensed(positive=rough)
     kkt = KKT(lin, condensed, vertex, pressure)
