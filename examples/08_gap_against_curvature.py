@@ -1,8 +1,8 @@
 """Gap against curvature: how far the outer tube of a torus must be shifted to stop a bubble on top.
 
-On the paper's torus (R = 20, r = 4, gap 0.5) a bubble of volume 0.5 drifts to the outer equator. An outer tube
-shifted outwards by a widens the gap there by about a cos φ, and the bubble prefers narrow places. The paper
-balances both where |δd| = |GV/3π|; theory of second order and the computed film say how much that is off.
+On the paper's torus (R = 20, r = 4, gap 0.5) a bubble of volume 0.5 drifts to the outer equator. An outer
+tube shifted outwards by a widens the gap there by about a cos φ, and the bubble prefers narrow places. The
+paper balances both where |δd| = |GV/3π|; theory of second order and the computed film say how far it is off.
 
     python examples/08_gap_against_curvature.py
 """
