@@ -30,9 +30,8 @@ class Crooked:
 
 
 # a surface with arcs of its own, which is no kind of Sphere
-Foreign = type(
-    "Foreign", (), {k: v for k, v in vars(wf.Sphere).items() if k not in ("__dict__", "__weakref__")}
-)
+OWN = {k: v for k, v in vars(wf.Sphere).items() if k not in ("__dict__", "__weakref__")}
+Foreign = type("Foreign", (), OWN)
 
 
 table(
