@@ -321,6 +321,14 @@ def test_relax_refuses_and_reports(tmp_path: Path) -> None:
     assert file.read_bytes() == before
 
 
+def test_a_potential_along_a_path_is_drawn_as_curves(tmp_path: Path) -> None:
+    facts = json.loads(call("potential", "torus", "--along", "5", "-o", tmp_path, "--json").stdout)
+    assert str(tmp_path / "potential_path.png") in facts["outputs"]
+    assert (tmp_path / "potential_path.png").read_bytes().startswith(b"\x89PNG")
+    call("potential", "torus", "--points", "60", "-o", tmp_path, "--no-picture")
+    assert not (tmp_path / "potential_path.png").exists()
+
+
 # ------------------------------------------------------------------ plot
 
 
