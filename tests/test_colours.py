@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -23,7 +24,7 @@ from warpedfoam.plot.histories import _CURVES
 from warpedfoam.view.scalars import bubble_scalars
 
 from .colour_vision import DEFICIENCIES, ciede2000, lab
-from .io_foams import bubble_on_torus, sphere_foam, torus_foam, with_pressures
+from .io_foams import bubble_on_torus, lone_bubble, sphere_foam, torus_foam, with_pressures
 
 #: Least ΔE00 of neighbouring charges (1 is just seen side by side), of outlines, of a charge and a film.
 CHARGES_APART, OUTLINES_APART, FILMS_APART = 12.0, 7.0, 12.0
@@ -103,6 +104,16 @@ def test_the_same_colour_in_every_picture() -> None:
         for bar in bars:
             at = round(bar.get_x() + 0.5 * bar.get_width())
             assert bar.get_facecolor()[:3] == pytest.approx(table[6 - at if name == "sides" else at])
+
+
+def test_an_exterior_that_is_a_disk_is_grey_too() -> None:
+    """Round one cluster on a sphere: not of some charge, and no bubble to be counted."""
+    foam = replace(lone_bubble(), exterior=1)
+    found = bubble_colours(foam, "area")
+    assert found.inside.tolist() == [True, False]
+    assert found.limits == (foam.bubble_areas[0], foam.bubble_areas[0])
+    np.testing.assert_array_equal(bubble_colours(foam).rgb[1], as_rgb(OUTSIDE_COLOUR))
+    assert plot_map(foam).axes[0].get_title().startswith("1 bubble on a sphere")
 
 
 def test_values_of_the_callers_own() -> None:

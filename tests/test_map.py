@@ -26,6 +26,7 @@ from warpedfoam import (
     voronoi_foam,
 )
 from warpedfoam.io.patches import bubble_patches
+from warpedfoam.plot.map_picture import _pieces
 from warpedfoam.plot.maps import chart_of, projections, regions, sheets, window_area
 
 from .io_foams import bubble_on_torus, lone_bubble, sphere_foam, torus_foam, with_pressures
@@ -162,15 +163,13 @@ def test_scales(name: str, way: str) -> None:
 @pytest.mark.parametrize(("name", "way"), CASES)
 def test_no_line_runs_across_the_map(name: str, way: str) -> None:
     foam = foam_on(name)
-    figure = plot_map(foam, way, width=86.0)
-    lines = [c for c in figure.axes[0].collections if c.get_zorder() == 2.0]
-    (films,) = lines
-    steps = np.concatenate([np.linalg.norm(np.diff(s, axis=0), axis=1) for s in films.get_segments()])
-    width = np.ptp(figure.axes[0].get_xlim())
-    assert steps.max() < 0.12 * width
-    # every film is there: its points, in order
     chart = chart_of(foam.cell.surface, way, None)
-    drawn = np.concatenate(films.get_segments())
+    pieces = _pieces(chart.strands(foam.film_curves(17)), chart)
+    steps = np.concatenate([np.linalg.norm(np.diff(piece, axis=0), axis=1) for piece in pieces])
+    width = np.ptp(chart.drawn(chart.edge()[0], np.zeros(len(chart.edge()[0]), dtype=int))[:, 0])
+    assert steps.max() < 0.12 * width
+    # every film is there: its middle lies on a line
+    drawn = np.concatenate(pieces)
     at = chart.where(foam.film_curves(3)[:, 1])
     near = np.array([np.linalg.norm(drawn - p, axis=1).min() for p in at])
     assert near.max() < 0.06 * width
@@ -245,6 +244,15 @@ def test_an_exterior_is_what_is_left(way: str) -> None:
         areas = found.bubble_areas(2)
         assert areas.sum() == pytest.approx(window_area(chart), rel=1e-12)
         assert 0.0 < areas[0] < 0.1 * areas[1]
+
+
+def test_the_picture_has_the_films() -> None:
+    foam = foam_on("torus")
+    (films,) = [c for c in plot_map(foam).axes[0].collections if c.get_zorder() == 2.0]
+    chart = chart_of(foam.cell.surface, None, None)
+    expected = _pieces(chart.strands(foam.film_curves(17)), chart)
+    assert len(films.get_segments()) == len(expected) > foam.network.n_films
+    np.testing.assert_allclose(np.concatenate(films.get_segments()), np.concatenate(expected))
 
 
 def test_what_the_picture_says() -> None:

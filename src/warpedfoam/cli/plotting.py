@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from warpedfoam.arrays import as_choice
 from warpedfoam.cli.converting import read_foam
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import writable_path
 from warpedfoam.plot.style import FORMATS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Pictures, and the options that each takes besides those that all take.
 KINDS: Mapping[str, tuple[str, ...]] = {
@@ -81,7 +78,7 @@ def plot_file(
     }
 
 
-def _drawn(foam: Foam, kind: str, given: dict[str, Any]) -> Figure:
+def _drawn(foam: Foam, kind: str, given: dict[str, Any]) -> Any:
     from warpedfoam import plot
     from warpedfoam.analysis import foam_statistics
 

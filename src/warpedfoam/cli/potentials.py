@@ -22,7 +22,7 @@ from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import Surface, Torus
 
 METHODS = ("theory", "ruled", "free")
-TABLE, PICTURE, RECORD = "potential.csv", "potential.png", "potential.json"
+TABLE, PICTURE, CURVES, RECORD = "potential.csv", "potential.png", "potential_path.png", "potential.json"
 
 
 def map_potential(surface: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -74,6 +74,12 @@ def map_potential(surface: Mapping[str, Any], given: Mapping[str, Any]) -> dict[
         outputs.append(save_figure(folder / PICTURE, plot_potential(found[-1])))
     else:
         (folder / PICTURE).unlink(missing_ok=True)
+    if given["picture"] and along is not None:
+        from warpedfoam.plot import plot_potential_path, save_figure
+
+        outputs.append(save_figure(folder / CURVES, plot_potential_path(found)))
+    else:
+        (folder / CURVES).unlink(missing_ok=True)
     facts = {
         "surface": {"kind": kind, **sizes},
         "gap": cell.mean_gap,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -141,7 +142,8 @@ def _scale(colours: BubbleColours) -> ScalarMappable:
 
 
 def _bar(bar: Colorbar, colours: BubbleColours, style: Style) -> None:
-    bar.set_label(colours.label, fontsize=1.1 * style.text)
+    letters = int(72.0 * style.width / (0.6 * style.text)) if style.narrow else 200
+    bar.set_label(textwrap.fill(colours.label, letters), fontsize=1.1 * style.text)
     bar.ax.tick_params(labelsize=style.text)
     for axis in (bar.ax.xaxis, bar.ax.yaxis):
         axis.get_offset_text().set_fontsize(style.small)
