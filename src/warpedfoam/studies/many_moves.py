@@ -18,8 +18,8 @@ from warpedfoam.surfaces.places import Places
 
 #: Least distance of two moves, in bubble sizes: each is alone in a patch of about thirty bubbles.
 APART = 6.0
-#: By how much, in γ d ℓ, a region may rise before its move is dropped, round by round before the last.
-SLACKS = (0.05, 0.01)
+#: By how much, in γ d ℓ, a region may rise before its move is dropped, round by round.
+SLACKS = (0.05, 0.01, 0.0, 0.0)
 #: Change of a region's energy, in γ d ℓ, below which nothing has happened there.
 NOTHING = 1e-6
 
@@ -79,7 +79,7 @@ def many_moves(
     chosen: Ints = np.arange(len(plans))
     rise: float | None = None
     best: ManyMoves | None = None
-    for slack in (*SLACKS, 0.0):
+    for slack in SLACKS:
         trial = relaxed_or_none(made(foam, [plans[i] for i in chosen]), order)
         if trial is None or not trial.converged:
             break
