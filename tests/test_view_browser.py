@@ -367,3 +367,5 @@ def test_two_thousand_bubbles(browser, tmp_path):
     assert browser.ask(drawn) == count
     times = browser.ask("foamViewer.time(3)")
     assert len(times) == 3
+    cost = browser.ask("foamViewer.cost()")
+    assert 0.0 < cost["picture"] < cost["frame"]

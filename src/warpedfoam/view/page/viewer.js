@@ -297,4 +297,28 @@ window.foamViewer = {
     }
     return out;
   },
+  /** Milliseconds of the page's own work: a picture without its drawing, and going on to another frame. */
+  cost: async () => {
+    const viewer = await ready, { camera, canvas, painter } = viewer, real = painter.gl;
+    const pictures = (count) => {
+      for (let k = 0; k < count; k++) {
+        camera.turn(6, 2, canvas.clientWidth, canvas.clientHeight);
+        painter.draw(camera, viewer.look);
+      }
+    };
+    painter.gl = new Proxy(real, { get: (gl, name) => (typeof gl[name] === "function" ? () => false : gl[name]) });
+    pictures(200);
+    const began = performance.now();
+    pictures(2000);
+    const picture = (performance.now() - began) / 2000, number = viewer.number;
+    painter.gl = real;
+    const times = [];
+    for (let k = 0; k < 5; k++) {
+      viewer.frames.kept.clear();
+      const start = performance.now();
+      await viewer.show(number);
+      times.push(performance.now() - start);
+    }
+    return { picture, frame: times.sort((a, b) => a - b)[2] };
+  },
 };
