@@ -119,7 +119,7 @@ class Viewer {
   told() {
     const { frame, place, facts, number } = this, about = frame.facts;
     byId("frame-facts").textContent =
-      `${about.bubbles} bubbles, energy ${written(about.energy)}, gap ${written(about.gap)}`;
+      `${about.held} bubbles, energy ${written(about.energy)}, gap ${written(about.gap)}`;
     byId("frame").value = number;
     byId("frame").setAttribute("aria-valuetext", about.label);
     byId("frame-label").textContent = `${about.label} (${number + 1}/${facts.frames.length})`;
