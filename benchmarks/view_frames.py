@@ -2,7 +2,9 @@
 
 Graphics are computed by the processor (SwiftShader), so this is a floor: any graphics card is faster.
 Beside the time on the clock stands the processor time of the browser's processes, which other work on the
-machine does not lengthen.
+machine does not lengthen. "script" is what the page itself does for a picture, with a graphics library that
+does nothing: all that is left of the processor's work where there is a graphics card. "frame" is what it does
+to go on to another frame of a trajectory: unpack it and hand it over.
 
     PYTHONPATH=src:. python benchmarks/view_frames.py [bubbles ...]
 """
@@ -45,7 +47,10 @@ def processor_time(pid: int) -> float:
 
 def main(counts: list[int]) -> None:
     """Print one line a foam."""
-    print("bubbles  window    file/MB  write/s  open/s  ms a picture (median)  processor ms a picture")
+    print(
+        "bubbles  window    file/MB  write/s  open/s  ms a picture (median)  processor ms a picture  "
+        "script us  frame ms"
+    )
     browser = Browser()
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -69,9 +74,11 @@ def main(counts: list[int]) -> None:
                     before = processor_time(browser.pid)
                     times = browser.ask("foamViewer.time(20)")
                     used = 1e3 * (processor_time(browser.pid) - before) / len(times)
+                    cost = browser.ask("foamViewer.cost()")
                     print(
                         f"{count:7d}  {name:8s}  {path.stat().st_size / 1e6:7.2f}  {wrote:7.2f}  "
-                        f"{opened:6.2f}  {np.median(times):21.1f}  {used:22.1f}"
+                        f"{opened:6.2f}  {np.median(times):21.1f}  {used:22.1f}  "
+                        f"{1e3 * cost['picture']:9.0f}  {cost['frame']:8.1f}"
                     )
     finally:
         browser.close()

@@ -80,7 +80,7 @@ def evolved(path: Path, *, refined: int = 0, minimum: bool = True) -> list[wf.Ev
 
 
 @live
-@pytest.mark.parametrize(("kind", "n"), [("sphere", 12), ("torus", 12), ("sphere", 50), ("torus", 50)])
+@pytest.mark.parametrize(("kind", "n"), [("sphere", 12), ("torus", 12), ("sphere", 50)])
 def test_the_evolver_agrees(tmp_path: Path, kind: str, n: int) -> None:
     foam = wf.load(DATA / f"{kind}_{n}.npz")
     dumps = [evolved(wf.write_fe(tmp_path / f"{s}.fe", foam, segments=s))[0] for s in (4, 8, 16)]
@@ -264,8 +264,9 @@ def test_refusals(tmp_path: Path) -> None:
     hill = wf.Graph(lambda x: 0.1 * x[:, 0] ** 2, lambda x: 0.2 * x * [1.0, 0.0], 2.0, 2.0)
     with pytest.raises(ValueError, match="Sphere or Torus, got Graph"):
         wf.write_fe(tmp_path / "f.fe", wf.voronoi_foam(wf.HeleShawCell(hill, 0.1), 12, seed=1))
+    egg = wf.voronoi_foam(wf.HeleShawCell(wf.Ellipsoid(1.0, 1.1, 1.2), 0.1), 16, seed=1)
     with pytest.raises(ValueError, match=r"formula of the outer plate.*Ellipsoid"):
-        wf.write_fe(tmp_path / "f.fe", relaxed_on(*SURFACES["spheroid"]), model="soapfilm")
+        wf.write_fe(tmp_path / "f.fe", egg, model="soapfilm")
     with pytest.raises(ValueError, match="bubble 0 is none"):
         wf.write_fe(tmp_path / "f.fe", belts())
     for options in ({"model": "film"}, {"segments": 0}, {"layers": 0}):

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 import pyvista
 import trimesh
+from pyarrow import csv
 
 import warpedfoam as wf
 from warpedfoam.io.patches import bubble_patches, film_points
@@ -190,10 +191,14 @@ def test_parquet(tmp_path: Path, foam: wf.Foam) -> None:
         path = write(tmp_path / "t.parquet", foam)
         table, frame = pq.read_table(path), pd.read_parquet(path)
         plain = pd.read_csv(text(tmp_path / "t.csv", foam))
+        arrow = csv.read_csv(tmp_path / "t.csv")
+        assert arrow.num_rows == len(plain)
         assert table.column_names == list(frame.columns) == list(plain.columns)
         for name in frame.columns:
             np.testing.assert_allclose(frame[name].to_numpy(), plain[name].to_numpy(), rtol=1e-15)
             assert str(table.schema.field(name).type) in ("int64", "double")
+            if plain[name].notna().all():
+                np.testing.assert_array_equal(arrow[name].to_numpy(), frame[name].to_numpy())
 
 
 def test_a_missing_package_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

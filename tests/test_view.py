@@ -272,6 +272,18 @@ def test_what_an_exterior_has_not_is_not_shown(tmp_path):
     np.testing.assert_array_equal(arrays["rgb:area"].reshape(-1, 3)[1], [0xC4, 0xC4, 0xC4])
 
 
+def test_clusters_are_counted_and_seen_from_their_front(tmp_path):
+    cell = wf.HeleShawCell(wf.Torus(3.0, 1.2), 0.1)
+    foam = wf.cluster_foam(cell, 3, volumes=0.1, centre=[0.0, -4.2, 0.0])
+    facts, _ = read_page(wf.write_view(tmp_path / "v.html", foam))
+    assert facts["title"] == "3 bubbles, torus"
+    assert facts["frames"][0]["held"] == 3
+    e, a = np.radians([facts["view"]["elevation"], facts["view"]["azimuth"]])
+    towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    held = np.delete(foam.bubble_centres, foam.exterior, axis=0)
+    assert (cell.surface.normals(held) @ towards > 0.5).all()
+
+
 def test_detail_falls_with_bubbles_and_frames():
     sizes = [np.prod(detail(n)) for n in (5, 50, 200, 900, 50_000)]
     assert (np.diff(sizes) < 0).all()

@@ -9,7 +9,8 @@ import pytest
 
 import warpedfoam as wf
 
-from .browser import Browser, awaited_browser
+from . import browser as driver
+from .browser import COMING, Browser, awaited_browser
 from .io_foams import bubble_on_torus, sphere_foam, torus_foam, with_pressures
 from .test_view import repeating, rimmed
 
@@ -89,6 +90,18 @@ def check_numbers(browser, foam, bubble):
         assert number(rows["pressure"]) == pytest.approx(foam.pressures[bubble], rel=1e-4)
     mean = foam.bubble_curvatures[bubble] / foam.bubble_areas[bubble]
     assert number(rows["mean Gaussian curvature"]) == pytest.approx(mean, rel=1e-4)
+
+
+def test_an_installation_is_waited_for(monkeypatch, tmp_path):
+    """Until it says that it has ended, and no longer than that: with a browser or without."""
+    there, found = tmp_path / "there", []
+    monkeypatch.setenv(COMING, str(there))
+    monkeypatch.setattr(driver.time, "sleep", lambda _: (found.append("chromium"), there.touch()))
+    monkeypatch.setattr(driver, "browser_path", lambda: found[0] if found else None)
+    assert awaited_browser() == "chromium"
+    assert len(found) == 1
+    found.clear()
+    assert awaited_browser() is None
 
 
 # ------------------------------------------------------------------ drawing
@@ -367,3 +380,5 @@ def test_two_thousand_bubbles(browser, tmp_path):
     assert browser.ask(drawn) == count
     times = browser.ask("foamViewer.time(3)")
     assert len(times) == 3
+    cost = browser.ask("foamViewer.cost()")
+    assert 0.0 < cost["picture"] < cost["frame"]

@@ -75,10 +75,8 @@ def write_graph_json(path: PathLike, foam: Foam, *, graph: str = "bubbles") -> P
 
     Raises
     ------
-    TypeError, ValueError
-        Arguments of the wrong type or unknown, a name that does not end in ``.json``.
-    FileNotFoundError, IsADirectoryError
-        If the path cannot be written.
+    TypeError, ValueError, OSError
+        As `write_graphml`; a name that does not end in ``.json``.
 
     Examples
     --------

@@ -54,10 +54,8 @@ def write_films_parquet(path: PathLike, foam: Foam) -> Path:
 
     Raises
     ------
-    ImportError
-        If pyarrow is not installed (the extra ``formats``).
-    TypeError, ValueError, FileNotFoundError, IsADirectoryError
-        As `write_films_csv`; a name that does not end in ``.parquet``.
+    ImportError, TypeError, ValueError, OSError
+        As `write_bubbles_parquet`.
     """
     return _write(writable_path(path, suffixes=(".parquet",)), film_columns(foam))
 

@@ -83,10 +83,8 @@ def write_films_csv(path: PathLike, foam: Foam) -> Path:
 
     Raises
     ------
-    TypeError
-        If ``foam`` is not a Foam.
-    FileNotFoundError, IsADirectoryError, ValueError
-        If the path cannot be written.
+    TypeError, ValueError, OSError
+        As `write_bubbles_csv`.
     """
     target = writable_path(path)
     return _write(target, film_columns(foam))

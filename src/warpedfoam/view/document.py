@@ -192,13 +192,27 @@ def _words(labels: object, count: int) -> list[str]:
 def _heading(foams: Sequence[Foam]) -> str:
     names = sorted({type(foam.cell.surface).__name__ for foam in foams})
     kinds = [_PROPER.get(name) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower() for name in names]
-    counts = sorted({foam.n_bubbles for foam in foams})
+    counts = sorted({_held(foam) for foam in foams})
     bubbles = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     return f"{bubbles} bubbles, {', '.join(kinds)}"
 
 
+def _held(foam: Foam) -> int:
+    """Number of bubbles, an exterior not counted."""
+    return foam.n_bubbles - (foam.exterior is not None)
+
+
 def _first_view(foam: Foam, drawn: Geometry) -> dict[str, float]:
-    """Elevation and azimuth in degrees: from the side and a little above, or from above what lies flat."""
+    """Elevation and azimuth in degrees: from the side and a little above, or from above what lies flat.
+
+    Clusters are seen from the front of the first.
+    """
+    if foam.exterior is not None:
+        first = int(foam.exterior == 0)
+        x, y, z = foam.cell.surface.normals(foam.bubble_centres[first : first + 1])[0].tolist()
+        elevation = float(np.degrees(np.arctan2(z, np.hypot(x, y))))
+        # a little from the side, so that the surface is seen to bend
+        return {"elevation": elevation, "azimuth": float(np.degrees(np.arctan2(y, x))) - 15.0}
     extent = np.ptp(drawn.points, axis=0)
     if extent[2] <= 1e-9 * foam.cell.surface.size:
         return {"elevation": 90.0, "azimuth": -90.0}
@@ -223,6 +237,7 @@ def _frame_facts(
     return {
         "label": label,
         "bubbles": foam.n_bubbles,
+        "held": _held(foam),
         "energy": foam.energy,
         "gap": foam.cell.mean_gap,
         "size": foam.bubble_size,
