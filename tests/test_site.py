@@ -81,7 +81,7 @@ def test_every_example_has_a_page_and_a_picture(site: Path) -> None:
         page = text_of(site / "gallery" / f"{name}.html")
         assert example.name in page
         shown = re.findall(rf"_images/(example_{example.stem}\w*\.png)", page)
-        assert shown
+        assert shown, f"draw it with: python3 run.py gallery example_{example.stem}"
         assert all((site / "_images" / name).stat().st_size > 5_000 for name in shown)
 
 

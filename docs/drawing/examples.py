@@ -52,7 +52,7 @@ def run_script(name: str, arguments: tuple[Any, ...], picture: str | Callable[[P
         with contextlib.redirect_stdout(said):
             module(name).main(*arguments)
         if isinstance(picture, str):
-            target.write_bytes((out / picture).read_bytes())
+            target.write_bytes(min(out.glob(picture)).read_bytes())
         else:
             picture(out, target)
     target.with_suffix(".txt").write_text(said.getvalue(), encoding="utf-8")
@@ -78,7 +78,10 @@ SCRIPTS: dict[str, tuple[tuple[Any, ...], str | Callable[[Path, Path], None]]] =
     "05_polydispersity_ensemble": ((8, 150, "out", 0), "polydispersity.png"),
     "06_scars_on_spheres": ((1, 400), "scars.png"),
     "07_bubble_on_a_torus": ((), "torus_energy.png"),
+    "09_three_bubbles_drifting": (("out",), "three_bubbles.png"),
 }
+#: What a new example gets until it stands above: ``main("out")`` and the first picture that it writes.
+PLAIN: tuple[tuple[Any, ...], str | Callable[[Path, Path], None]] = (("out",), "*.png")
 
 
 def study(name: str, overrides: list[str]) -> None:
@@ -119,7 +122,10 @@ def notebook(name: str) -> None:
 
 
 PICTURES: dict[str, Callable[[], None]] = {
-    **{name: (lambda n=name, a=args: run_script(n, *a)) for name, args in SCRIPTS.items()},
+    **{
+        path.stem: (lambda n=path.stem: run_script(n, *SCRIPTS.get(n, PLAIN)))
+        for path in sorted(EXAMPLES.glob("*.py"))
+    },
     **{name: (lambda n=name, o=options: study(n, o)) for name, options in STUDIES.items()},
     "foam": main_job,
     "main_job": lambda: notebook("main_job"),
