@@ -13,7 +13,9 @@ from typing import Any
 
 import nbclient
 import nbformat
+import numpy as np
 from concepts import relaxed
+from matplotlib.figure import Figure
 
 import warpedfoam as wf
 
@@ -69,6 +71,32 @@ def by_pressure(out: Path, target: Path) -> None:
     wf.save_picture(target, wf.load(out / "foam.npz"), color_by="pressure", dpi=110)
 
 
+def shifted_tube(_out: Path, target: Path) -> None:
+    """A section through the cell of example 08, its outer tube shifted far too much."""
+    found = module("08_gap_against_curvature")
+    radius, gap, shift = 4.0, float(found.GAP), 0.35
+    figure = Figure(figsize=(6.0, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    angle = np.linspace(0.0, 2.0 * np.pi, 400)
+    axes.plot(radius * np.cos(angle), radius * np.sin(angle), color="0.45", lw=3.0)
+    outer = radius + gap
+    axes.plot(shift + outer * np.cos(angle), outer * np.sin(angle), color="#2f78bd", lw=3.0)
+    axes.plot(outer * np.cos(angle), outer * np.sin(angle), ":", color="0.5", lw=1.2)
+    rim = np.array([-0.09, 0.09])
+    inner, lid = 0.5 * np.pi + rim, 0.5 * np.pi + rim[::-1]
+    x = np.r_[radius * np.cos(inner), outer * np.cos(lid)]
+    y = np.r_[radius * np.sin(inner), outer * np.sin(lid)]
+    axes.fill(x, y, color="#cc3d28", alpha=0.8)
+    axes.text(0.0, outer + 0.25, "the bubble, held on top", ha="center", fontsize=10)
+    axes.text(0.0, 0.0, "tube of the torus,\naxis far to the left", ha="center", va="center", fontsize=10)
+    axes.annotate("wider gap", (outer + 0.15, 0.0), (outer + 0.9, 0.0), va="center", fontsize=10)
+    axes.annotate("narrower", (-outer - 0.1, 0.0), (-outer - 1.9, 0.0), va="center", fontsize=10)
+    axes.set(aspect="equal", xlim=(-6.6, 7.2), ylim=(-4.9, 5.3))
+    axes.set_title("outer plate (blue) shifted outward by a: here hundreds of times too far", fontsize=10)
+    axes.set_axis_off()
+    wf.save_figure(target, figure, dpi=120)
+
+
 #: Arguments as on the page, and the picture: a file that the example writes, or a function.
 SCRIPTS: dict[str, tuple[tuple[Any, ...], str | Callable[[Path, Path], None]]] = {
     "01_first_foam_torus": (("out",), "torus.png"),
@@ -78,6 +106,7 @@ SCRIPTS: dict[str, tuple[tuple[Any, ...], str | Callable[[Path, Path], None]]] =
     "05_polydispersity_ensemble": ((8, 150, "out", 0), "polydispersity.png"),
     "06_scars_on_spheres": ((1, 400), "scars.png"),
     "07_bubble_on_a_torus": ((), "torus_energy.png"),
+    "08_gap_against_curvature": ((), shifted_tube),
     "09_three_bubbles_drifting": (("out",), "three_bubbles.png"),
 }
 #: What a new example gets until it stands above: ``main("out")`` and the first picture that it writes.

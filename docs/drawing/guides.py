@@ -71,6 +71,13 @@ def scars(path: Path) -> None:
     wf.save_figure(path, drawn(rows))
 
 
+def drift(path: Path) -> None:
+    """Bubbles that drift to the outer equator: examples/09_three_bubbles_drifting.py."""
+    with tempfile.TemporaryDirectory() as folder:
+        runpy.run_path(str(ROOT / "examples" / "09_three_bubbles_drifting.py"))["main"](folder)
+        path.write_bytes((Path(folder) / "three_bubbles.png").read_bytes())
+
+
 def viewer(path: Path) -> None:
     """A photograph of the page in a real browser, one bubble picked."""
     sys.path.insert(0, str(ROOT))
@@ -105,5 +112,6 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "cylinder": of_the_paper("cylinder"),
     "torus_energy": of_the_paper("torus"),
     "scars": scars,
+    "drift": drift,
     "viewer": viewer,
 }
