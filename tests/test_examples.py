@@ -7,6 +7,7 @@ the machine, because a T1 more or less leads to another minimum.
 from __future__ import annotations
 
 import importlib.util
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -150,3 +151,22 @@ def test_gap_against_curvature(capsys: pytest.CaptureFixture[str]) -> None:
     assert second == pytest.approx(found, abs=0.006)
     assert abs(left) < 1e-10
     assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+def test_the_table_and_the_page_of_scars() -> None:
+    """Every size with several seeds, twelve charges more than pairs account for, and the page's means."""
+    root = EXAMPLES.parent
+    rows = example("06_scars_on_spheres").kept(root / "data" / "scars.csv")
+    page = (root / "docs" / "partitions.md").read_text(encoding="utf-8")
+    scars = example("06_scars_on_spheres")
+    assert {row["n"] for row in rows} == {*scars.SIZES}
+    for n in scars.SIZES:
+        same = [row for row in rows if row["n"] == n]
+        assert len(same) >= 3
+        for row in same:
+            # a² = 2A/(√3 N)
+            assert row["R/a"] == pytest.approx((3.0**0.5 * n / (8.0 * math.pi)) ** 0.5, rel=1e-9)
+            assert row["per site"] == pytest.approx(row["excess pairs"] / 12.0)
+            assert row["of these scars"] <= row["clusters of charge 1"] <= 12
+        mean = sum(row["per site"] for row in same) / len(same)
+        assert f"| {n} | {len(same)} | {same[0]['R/a']:.2f} | {mean:.2f} ± " in page
