@@ -16,7 +16,7 @@ import warpedfoam as wf
 from warpedfoam.plot import figure_circles
 
 ROOT = Path(__file__).resolve().parents[2]
-DATA, STORED = ROOT / "data", ROOT / "benchmarks" / "data"
+DATA = ROOT / "data"
 
 
 def on_mesh(name: str, path: Path) -> None:
@@ -64,9 +64,9 @@ def of_the_paper(name: str) -> Callable[[Path], None]:
 
 
 def scars(path: Path) -> None:
-    """From the table of the long run: examples/06_scars_on_spheres.py."""
+    """From the table of the long runs: examples/06_scars_on_spheres.py."""
     drawn = runpy.run_path(str(ROOT / "examples" / "06_scars_on_spheres.py"))["drawn"]
-    with (STORED / "scars.csv").open(newline="", encoding="utf-8") as stream:
+    with (DATA / "scars.csv").open(newline="", encoding="utf-8") as stream:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(stream)]
     wf.save_figure(path, drawn(rows))
 
