@@ -31,6 +31,7 @@ WRONG = {
     "figures": ["nothing"],
     "partition": ["cube", "-n", "12"],
     "convert": ["no_such_file.npz", "out.vtp"],
+    "drift": ["no_such_file.npz", "--duration", "1"],
 }
 
 
@@ -91,7 +92,7 @@ def test_all_verbs_are_there() -> None:
     verbs = {path[0] for path, _ in LEAVES}
     assert verbs >= {
         "run", "foam", "relax", "check", "potential", "defects", "ensemble", "view", "convert", "figures",
-        "info", "plot", "partition",
+        "info", "plot", "partition", "cluster", "drift",
     }  # fmt: skip
 
 

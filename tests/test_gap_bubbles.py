@@ -115,3 +115,16 @@ def test_the_page():
     assert space["report"].angle_error < 1e-3
     assert float(space["held"].forces[0, 0]) == pytest.approx(-0.1775998, abs=1e-7)
     assert "| 0.1 | −0.1775998 |" in text
+
+
+def test_a_bubble_drifts_down_a_wedge():
+    """F = s √(πV/d) against the drag λ π ρ d per speed: d ẋ = −γ s/λ, wherever it is."""
+    slope = 0.1
+    cell = wf.HeleShawCell(flat_plate(8.0), wf.LinearGap(1.0, (slope, 0.0, 0.0)))
+    start = wf.cluster_foam(cell, 1, volumes=1.0, centre=[[2.0, 0.0, 0.0]])
+    moved = wf.drift(start, friction=2.0, duration=4.0, every=1.0, tolerance=1e-3)
+    x = np.array([foam.bubble_centres[0, 0] for foam in moved.foams])
+    covered = np.diff(x + 0.5 * slope * x**2)[1:]
+    np.testing.assert_allclose(covered, -0.5 * slope, rtol=5e-3)
+    assert moved.volume_errors.max() < 1e-10
+    assert (np.diff(moved.step_energies) < 0.0).all()

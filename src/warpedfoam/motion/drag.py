@@ -209,12 +209,18 @@ def normal_moves(cell: HeleShawCell, state: State, length: float) -> tuple[Float
 def _area_density(
     cell: HeleShawCell, points: Floats, slope: Floats, normal: Floats, derivative: Floats
 ) -> Floats:
-    """Area of each film through the gap per parameter at its nodes, (K, F): Σ_t shares_t |d(x + t n)/dξ|."""
+    """Area of each film through the gap per parameter at its nodes, (K, F): Σ_t shares_t |x' + t n'|.
+
+    Heights and shares stretch with a gap that varies; its slope along the film only shears what is ruled.
+    """
     bend = np.einsum("kl,flx->fkx", derivative, normal)
+    if cell.layer.profile is not None:
+        stretch = cell.layer.profile.values(points)
+        bend *= stretch[..., None]
     out = np.zeros(points.shape[:2])
     for height, share in zip(cell.layer.heights, cell.layer.shares, strict=True):
         out += share * np.linalg.norm(slope + height * bend, axis=2)
-    return out.T
+    return out.T if cell.layer.profile is None else (stretch * out).T
 
 
 def motion_of(surface: Surface, network: CellNetwork, one: State, other: State) -> Floats:
