@@ -97,8 +97,6 @@ class System:
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
         self.exterior = exterior
-        # markers that follow their neighbours make Newton's steps inexact: near the end they stay
-        self.tight = False
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.mean_volume = float(targets.mean())
         if exterior is not None:
@@ -162,7 +160,7 @@ class Linearised:
         self.hessian[:, :4] *= system.length
         self.volume[:4] *= system.length
         self.force[:4] *= system.length
-        loose = system.exterior is not None and not system.tight
+        loose = system.exterior is not None
         held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=loose)
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
