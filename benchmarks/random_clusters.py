@@ -44,7 +44,8 @@ def main(seeds: int = 5) -> None:
                     print(f"  {name} {n} seed {seed}: {found.message}", flush=True)
             spent = (perf_counter() - start) / seeds
             print(
-                f"{name} {n}: {good} of {seeds} converged, {turns} T1s, {events} contacts, {spent:.1f} s each",
+                f"{name} {n}: {good} of {seeds} converged, {turns} T1s, {events} contacts, "
+                f"{spent:.1f} s each",
                 flush=True,
             )
 
