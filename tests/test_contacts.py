@@ -168,7 +168,7 @@ def test_two_bubbles_brought_into_contact_make_a_double() -> None:
     assert double.energy == pytest.approx(TWO, abs=1e-6)
     assert double.foam.network.bubble_euler.tolist() == [1, 1, -1]
     assert wf.with_contacts(double.foam)[1] == ()
-    apart = wf.relax(wf.part(double.foam, int(between(double.foam)[0])))
+    apart = wf.relax(wf.part(double.foam, int(between(double.foam)[0])), contacts=False)
     assert apart.energy == pytest.approx(2 * ONE, abs=1e-6)
     assert apart.foam.network.bubble_euler.tolist() == [1, 1, -2]
 

@@ -54,8 +54,6 @@ DRAFT = 0.03
 SADDLE, KICK = 1e-6, 0.05
 #: Least share of exact steps that go to and fro, and how often in a row before they are shortened.
 LEAST_DAMPING, PATIENCE = 1.0 / 16.0, 2
-#: Markers of clusters stay where they are along their films once a step is shorter than this, in ℓ.
-TIGHT = 3e-3
 SLIPPED = (
     "stopped: the volumes no longer add up, so a film has slipped round the surface or a bubble has turned "
     "inside out; use more bubbles, volumes that differ less, or more marker vertices"
@@ -317,7 +315,6 @@ def _history(rows: list[tuple[int, float, float, float, int, bool]]) -> Relaxati
 
 def _proximal_step(run: _Run, lin: Linearised) -> None:
     """One proximal step with local shifts, and the T1s that it calls for."""
-    run.system.tight = False
     network = run.state.network
     residual = one_ring(network, lin.residuals.vertex)
     shift = np.maximum(1e-5, residual / 0.15 * np.minimum(1.0, residual / 0.5))
@@ -452,7 +449,6 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
     run.damping = max(0.5 * run.damping, LEAST_DAMPING) if halve else min(2.0 * run.damping, 1.0)
     share *= run.damping
     run.past, run.last = now.force, step.vertices
-    run.system.tight = share * size < TIGHT
     _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
 
 

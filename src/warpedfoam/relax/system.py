@@ -106,10 +106,9 @@ class System:
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
         self.exterior = exterior
+        # in open clusters markers follow their neighbours
+        self.loose = exterior is not None
         self.loads: Loads | None = None
-        # in open clusters markers follow their neighbours, which makes Newton's steps inexact: near the
-        # end they stay
-        self.loose, self.tight = exterior is not None, False
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.mean_volume = float(targets.mean())
         if exterior is not None:
@@ -175,8 +174,7 @@ class Linearised:
         self.force[:4] *= system.length
         if system.loads is not None:
             system.loads.add(state, self.force, self.hessian)
-        loose = system.loose and not system.tight
-        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=loose)
+        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=system.loose)
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
         if system.loads is None and (held is not None or not system.invariant):

@@ -117,12 +117,13 @@ def probe_potential(
     --------
     At rest nothing pulls; a little off, the foam pulls back:
 
-    >>> from warpedfoam import FlatTorus, HeleShawCell, relax, voronoi_foam
-    >>> cell = HeleShawCell(FlatTorus(10.0, 10.0), gap=0.5)
-    >>> rest = relax(voronoi_foam(cell, 30, seed=1), order=4).foam
+    >>> from warpedfoam import HeleShawCell, Torus, relax, voronoi_foam
+    >>> tube = Torus(4.0, 1.5)
+    >>> rest = relax(voronoi_foam(HeleShawCell(tube, gap=0.1), 60, seed=3), order=6).foam
     >>> at = held_centre(rest, [0])
-    >>> found = probe_potential(rest, [0], points=[at, at + [0.1, 0.0, 0.0]], t1=False)
-    >>> bool(abs(found.forces[0]).max() < 1e-6), bool(found.forces[1, 0] < -0.01)
+    >>> up = tube.vertex_frames(at[None])[0, 0]
+    >>> found = probe_potential(rest, [0], points=[at, at + 0.1 * up], t1=False)
+    >>> bool(abs(found.forces[0]).max() < 1e-6), bool(found.forces[1] @ up < -1e-3)
     (True, True)
     """
     probe = _probe(foam, bubbles)
