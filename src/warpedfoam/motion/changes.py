@@ -6,14 +6,16 @@ the driver brings one to its volumes and keeps it if the energy falls.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from warpedfoam.arrays import Floats, Ints
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.kernels.periodic import nearest_image
+from warpedfoam.motion.meeting import meet_outlines
+from warpedfoam.motion.scene import Candidate, Scene, TopologyChange
 from warpedfoam.moves.t1 import allowed, lay_films, outward_tangents, pulls, rewire, t1_sites
 from warpedfoam.relax.sweep import NEW_LENGTH, PREFERENCE
 from warpedfoam.relax.system import State
@@ -21,33 +23,6 @@ from warpedfoam.relax.wall_sweep import WallLimits, plan_walls, turned_walls
 
 #: Shares of the old film's length tried for the new one.
 SHARES = (1.0, 0.5)
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What does not change during a run: the cell, ℓ, volumes over their mean, γ, ids, the cutoff in ℓ."""
-
-    cell: HeleShawCell
-    length: float
-    shares: Floats
-    tension: float
-    bubble_ids: Ints
-    cutoff: float
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A state of another topology, its volumes not yet right; who loses and gains a side, and where."""
-
-    kind: str
-    state: State
-    losers: tuple[int, ...]
-    gainers: tuple[int, ...]
-    position: tuple[float, float, float]
-
-
-#: Offers candidates from the states before and after a step, both of one network.
-TopologyChange = Callable[[Scene, State, State], Iterable[Candidate]]
 
 
 def chords(cell: HeleShawCell, state: State) -> Floats:
@@ -140,4 +115,4 @@ def turn_at_walls(scene: Scene, before: State, state: State) -> Iterator[Candida
 
 
 #: Every kind of change that is tried between steps, in this order; others can be added here.
-CHANGES: tuple[TopologyChange, ...] = (turn_films, turn_at_walls)
+CHANGES: tuple[TopologyChange, ...] = (meet_outlines, turn_films, turn_at_walls)

@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 
 from warpedfoam.arrays import as_flag, as_instance, as_number, frozen
+from warpedfoam.errors import TopologyError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, writable_path
 from warpedfoam.io.trajectory import SUFFIXES, Trajectory, TrajectoryWriter
-from warpedfoam.motion.changes import CHANGES, Scene, chords, cutoffs
+from warpedfoam.motion.changes import CHANGES, chords, cutoffs
 from warpedfoam.motion.drag import FrictionLaw
 from warpedfoam.motion.markers import spaced
+from warpedfoam.motion.meeting import crosses, marked
 from warpedfoam.motion.options import DriftOptions
 from warpedfoam.motion.result import Drift, DriftEvent
+from warpedfoam.motion.scene import Scene
 from warpedfoam.motion.stepper import StepFailed, Stepper
 from warpedfoam.relax.system import State
 
@@ -42,6 +45,7 @@ TOO_SHORT = (
     "stopped: steps became too short at time {time:.6g} ({fault}); a film is about to vanish that may not "
     "turn: one that ends in a marker, or of a bubble with three sides"
 )
+MET = "stopped: outlines have met at time {time:.6g}, and {fault}"
 VANISHED = "stopped: bubble {name} has all but vanished at time {time:.6g}"
 
 
@@ -118,7 +122,7 @@ def drift(
     order : int, optional
         p of the films; the foam's own by default.
     t1 : bool, optional
-        Whether films may turn.
+        Whether films may turn, and clusters meet and part.
     cutoff : float, optional
         Films shorter than this many bubble sizes may turn, if the energy falls.
     trajectory : str or path, optional
@@ -147,7 +151,7 @@ def drift(
     Notes
     -----
     The viscous froth is due to N. Kern, D. Weaire, A. Martin, S. Hutzler and S. J. Cox, Phys. Rev. E 70,
-    041411 (2004). Films that come to cross each other are not noticed; see `cluster_clearance`.
+    041411 (2004). Outlines that meet are joined and films that let go are parted as in `relax`.
 
     Examples
     --------
@@ -354,7 +358,9 @@ def _travelled(
     if progress is not None:
         progress("drift", 1.0)
     columns = np.array(run.log)
-    ended = f"drifted for {run.time:g} in {run.count} steps with {len(run.events)} T1s"
+    met = sum(not event.kind.endswith("t1") for event in run.events)
+    contacts = f" and {met} contact{'s' if met > 1 else ''}" if met else ""
+    ended = f"drifted for {run.time:g} in {run.count} steps with {len(run.events) - met} T1s{contacts}"
     return Drift(
         foams=tuple(run.foams),
         times=frozen(np.array(run.times)),
@@ -385,6 +391,8 @@ def _step(run: _Run, target: float) -> None:
             made = run.stepper.advance(run.state, time)
             if _lost(run, made.state):
                 raise StepFailed("a film shrinks too fast")
+            if options.t1 and crosses(_scene(run), run.state, made.state):
+                raise StepFailed("outlines meet")
         except StepFailed as fault:
             run.step = FAILED[bool(run.fault)] * time
             run.bound = BELOW * time
@@ -413,7 +421,10 @@ def _step(run: _Run, target: float) -> None:
     run.state = made.state
     _space_markers(run, energy)
     if options.t1:
-        _change_topology(run, before)
+        try:
+            _change_topology(run, before)
+        except TopologyError as fault:
+            run.fault = MET.format(time=run.time, fault=fault)
     run.log.append((run.time, run.stepper.energy(run.state), made.error, made.dissipation))
     if not options.hold_volumes:
         shares = run.stepper.volumes(run.state) / run.stepper.system.mean_volume
@@ -431,7 +442,7 @@ def _lost(run: _Run, state: State) -> bool:
 
 def _scene(run: _Run) -> Scene:
     foam, system = run.stepper.foam, run.stepper.system
-    return Scene(foam.cell, system.length, system.shares, foam.tension, foam.bubble_ids, run.options.cutoff)
+    return Scene(foam, system.length, system.shares, run.options.cutoff)
 
 
 def _space_markers(run: _Run, energy: float) -> None:
@@ -442,6 +453,8 @@ def _space_markers(run: _Run, energy: float) -> None:
         if moved is None:
             break
         fresh = moved
+    if run.options.t1:
+        fresh = marked(_scene(run), fresh)
     if fresh is run.state:
         return
     try:

@@ -21,7 +21,7 @@ class DriftEvent:
     step : int
         Steps in time before it.
     kind : str
-        ``"t1"`` or ``"wall t1"``.
+        ``"t1"``, ``"wall t1"``, ``"join"`` or ``"part"``.
     losers, gainers : tuple of int
         Ids of the bubbles that lost a side and of those that gained one (see `T1Event`).
     position : tuple of three float
@@ -88,8 +88,13 @@ class Drift:
 
     @property
     def n_t1(self) -> int:
-        """Changes of topology."""
-        return len(self.events)
+        """How many films have turned, walls' films among them."""
+        return sum(event.kind.endswith("t1") for event in self.events)
+
+    @property
+    def n_contacts(self) -> int:
+        """How often clusters have met or parted."""
+        return len(self.events) - self.n_t1
 
     @cached_property
     def energies(self) -> Floats:

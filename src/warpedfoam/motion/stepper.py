@@ -134,7 +134,7 @@ class Stepper:
         StepFailed
             If the time is too long for Newton's method.
         """
-        energy = self.energy(start)
+        energy = self.energy_at_volumes(start)
         here = self._across(start)
         guess = self._euler(self._drag(here, here, time), start)
         there = self._across(guess)
@@ -193,8 +193,19 @@ class Stepper:
             volumes[system.exterior] = system.targets[system.exterior]
         return float(np.abs(volumes / system.targets - 1.0).max())
 
+    def energy_at_volumes(self, state: State) -> float:
+        """The energy less Σ p (V − V*): that of exact volumes, which at rest is all that changes."""
+        energy = self.energy(state)
+        if not self.hold_volumes:
+            return energy
+        exterior, volumes, targets = self.foam.exterior, self.volumes(state), self.system.targets
+        if exterior is None:
+            volumes *= targets.sum() / volumes.sum()
+        zero = state.pressures.mean() if exterior is None else state.pressures[exterior]
+        return energy - self.scale * float((state.pressures - zero) @ (volumes - targets))
+
     def _require_lower(self, state: State, energy: float) -> None:
-        if not self.energy(state) <= energy * (1.0 + self.rounding):
+        if not self.energy_at_volumes(state) <= energy * (1.0 + self.rounding):
             raise StepFailed("the energy would rise")
 
     def _euler(self, drag: Drag, guess: State) -> State:
