@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import warpedfoam as wf
+from warpedfoam.motion.drag import FrictionLaw
+from warpedfoam.motion.stepper import Stepper
 
 PAPER = wf.Torus(20.0, 4.0)
 
@@ -57,3 +61,15 @@ def test_without_changes_of_topology_outlines_may_cross() -> None:
     assert not moved.events
     one, other = moved.foam.bubble_centres[:2]
     assert np.linalg.norm(other - one) < 2.0 * np.sqrt(0.5 / (0.5 * np.pi))
+
+
+def test_energies_are_judged_at_exact_volumes(meeting: wf.Drift) -> None:
+    """E − Σ p (V − V*) is the energy at V*, to second order in what the volumes are off."""
+    foam = wf.relax(meeting.foam).foam
+    grown = foam.target_volumes * np.where(np.arange(3) == 0, 1.0 + 1e-4, 1.0)
+    grown[2] -= grown.sum() - foam.target_volumes.sum()
+    other = replace(foam, target_volumes=grown)
+    stepper = Stepper(other, FrictionLaw(1.0), hold_volumes=True, method="euler")
+    state, goal = stepper.state_of(foam), wf.relax(other).energy
+    assert abs(stepper.energy(state) / goal - 1.0) > 1e-5
+    assert stepper.energy_at_volumes(state) == pytest.approx(goal, rel=1e-8)
