@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from pathlib import Path
 
@@ -79,6 +80,24 @@ class TestVtp:
         reader.Update()
         assert reader.GetOutput().GetNumberOfCells() == network.n_films + int(disks.sum())
 
+    def test_pandas_reads_the_same_numbers(self, tmp_path: Path, foam: wf.Foam) -> None:
+        """Without VTK: the file's XML as a table, the arrays decoded by the format's rules."""
+        path = wf.write_vtp(tmp_path / "foam.vtp", foam, curve_points=5)
+        table = pd.read_xml(path, xpath=".//CellData/DataArray", parser="etree").set_index("Name")
+        disks = foam.network.bubble_euler == 1
+        count = foam.network.n_films + int(disks.sum())
+        numpy_types = {"Float64": "<f8", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1"}
+        arrays = {}
+        for name, row in table.iterrows():
+            raw = base64.b64decode(row["DataArray"])
+            assert int.from_bytes(raw[:8], "little") == len(raw) - 8
+            arrays[name] = np.frombuffer(raw[8:], numpy_types[row["type"]])
+        kind = arrays["kind"]
+        assert len(kind) == count
+        np.testing.assert_array_equal(arrays["area"][kind == 1], foam.bubble_areas[disks])
+        np.testing.assert_array_equal(arrays["charge"][kind == 1], foam.network.charges[disks])
+        np.testing.assert_array_equal(arrays["length"][kind == 0], foam.film_lengths)
+
     def test_triangles_have_the_bubbles_areas(self, tmp_path: Path) -> None:
         foam = sphere_foam(30)
         seen = pyvista.read(wf.write_vtp(tmp_path / "foam.vtp", foam, fill="triangles", parts="bubbles"))
@@ -102,7 +121,13 @@ class TestVtp:
         for k, one in enumerate(foams):
             reader.set_active_time_point(k)
             assert reader.read()[0].n_lines == one.network.n_films
+        table = pd.read_xml(tmp_path / "run.pvd", xpath=".//DataSet", parser="etree")
+        assert table["timestep"].tolist() == [0.5, 2.0]
+        assert [wf.read_vtp(tmp_path / name).n_bubbles for name in table["file"]] == [12, 20]
         blocks = pyvista.read(wf.write_vtm(tmp_path / "foam.vtm", foams[0]))
+        parts = pd.read_xml(tmp_path / "foam.vtm", xpath=".//DataSet", parser="etree")
+        assert parts["name"].tolist() == ["bubbles", "films"]
+        assert all((tmp_path / name).exists() for name in parts["file"])
         assert blocks.keys() == ["bubbles", "films"]
         assert blocks["films"].n_cells == foams[0].network.n_films
         assert set(blocks["bubbles"].cell_data["bubble"].tolist()) == set(range(12))
@@ -181,6 +206,16 @@ def test_graphs(tmp_path: Path, foam: wf.Foam, graph: str) -> None:
         places = foam.bubble_centres if graph == "bubbles" else foam.vertex_points
         x = {int(node): data["x"] for node, data in one.nodes(data=True)}
         assert [x[k] for k in range(n_nodes)] == places[:, 0].tolist()
+    # pandas sees the same in the GraphML's XML
+    space = {"g": "http://graphml.graphdrawing.org/xmlns"}
+    keys = pd.read_xml(tmp_path / "net.graphml", xpath=".//g:key", namespaces=space, parser="etree")
+    key = keys.set_index("attr.name").loc["length", "id"]
+    ends = pd.read_xml(tmp_path / "net.graphml", xpath=".//g:edge", namespaces=space, parser="etree")
+    drawn = pd.read_xml(
+        tmp_path / "net.graphml", xpath=f".//g:edge/g:data[@key='{key}']", namespaces=space, parser="etree"
+    )
+    assert len(ends) == network.n_films
+    assert sorted(drawn["data"]) == sorted(foam.film_lengths)
 
 
 def test_parquet(tmp_path: Path, foam: wf.Foam) -> None:
