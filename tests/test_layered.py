@@ -147,8 +147,17 @@ def test_contact_at_right_angles_comes_out(ruled: dict[str, wf.Relaxation]) -> N
         result = wf.relax(foam, order=order, layers=4)
         assert isinstance(result, LayeredRelaxation)
         error.append(result.contact_error)
+        assert "not resolved" not in result.message
     assert error[0] < 1e-3
     assert error[1] < error[0] / 50.0
+
+
+def test_films_too_coarse_for_their_contact_say_so() -> None:
+    foam = wf.voronoi_foam(wf.HeleShawCell(wf.Sphere(1.0), gap=0.1), 12, seeds="lattice", order=2)
+    result = wf.relax(foam, layers=2)
+    assert isinstance(result, LayeredRelaxation)
+    assert result.contact_error > 0.02
+    assert "not resolved" in result.message
 
 
 def test_films_meet_at_120_degrees_all_the_way_across(ruled: dict[str, wf.Relaxation]) -> None:

@@ -26,6 +26,8 @@ MOST_STEPS, LONGEST, PATIENCE = 40, 0.1, 4
 SOFT = 1e-4
 #: Residual that counts as round-off of places through a thin gap, in ε size ℓ / d².
 ROUNDING = 4.0
+#: Contact angle's error, in radians, that a message tells of.
+UNRESOLVED = 0.02
 #: Gauss points on the rays of the fans that give volumes: bubbles of a few dozen on a surface are large.
 RAYS = 12
 
@@ -308,6 +310,11 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
     minimum = done and _is_minimum(system, terms, rigid)
     if minimum:
         message = f"converged in {iterations} steps from the ruled foam"
+        if terms.contact_error > UNRESOLVED:
+            message += (
+                f"; films are not resolved: they meet the plates up to {terms.contact_error:.2g} rad off a right "
+                "angle; take a higher order"
+            )
     elif done:
         message = "at rest, but the Hessian's inertia is not seen to be that of a minimum"
     else:
