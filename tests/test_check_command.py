@@ -140,7 +140,7 @@ def test_json_of_any_fault_can_be_parsed(name, tmp_path):
         (["--gap", "0"], "gap must be greater than 0"),
         (["--gap", "nan"], "gap must be finite"),
         (["-n", "0"], "n_bubbles must be at least 1"),
-        (["-n", "many"], "Usage"),
+        (["-n", "many"], "valid integer"),
         (["--repair", "no/such/folder.ply"], "no folder"),
         (["--repair", "new.obj"], ".ply"),
         (["--repair", ""], "must name a file"),

@@ -425,9 +425,12 @@ def test_pictures_tables_and_meshes_are_written(tmp_path):
     wf.write_ply(tmp_path / "foam.ply", foam)
     wf.write_bubbles_csv(tmp_path / "bubbles.csv", foam)
     wf.write_films_csv(tmp_path / "films.csv", foam)
-    # holds the foam itself, like `save`
     with pytest.raises(TypeError, match="plain function"):
-        wf.write_vtp(tmp_path / "foam.vtp", foam)
+        wf.save(tmp_path / "foam.npz", foam)
+    # a picture, without the foam that no file can hold
+    wf.write_vtp(tmp_path / "foam.vtp", foam)
+    with pytest.raises(wf.FileFormatError, match="holds no foam"):
+        wf.read_vtp(tmp_path / "foam.vtp")
     wf.write_view(tmp_path / "foam.html", foam)
     assert "Sphere" in repr(foam.cell)
     assert isinstance(foam.cell.surface, wf.Sphere)

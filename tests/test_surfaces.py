@@ -14,6 +14,7 @@ from scipy.stats import chi2
 import warpedfoam.surfaces
 from warpedfoam import Foam, HeleShawCell, Sphere, Surface, Torus
 from warpedfoam.surfaces import Layer, LevelSurface
+from warpedfoam.surfaces.level_twins import LevelTwin
 from warpedfoam.surfaces.netted import NettedSurface
 
 from .level_samples import FAMILY
@@ -31,7 +32,9 @@ def surface_classes():
 
 
 def test_every_surface_class_is_tested_and_is_a_surface():
-    assert surface_classes() == set(EXAMPLES) | {type(member.surface) for member in FAMILY.values()}
+    # twins, which cells make for gaps that vary, are held to their originals in test_gaps
+    seen = {kind for kind in surface_classes() if not issubclass(kind, LevelTwin)}
+    assert seen == set(EXAMPLES) | {type(member.surface) for member in FAMILY.values()}
     for surface in [*SURFACES, *(member.surface for member in FAMILY.values())]:
         assert isinstance(surface, Surface)
 

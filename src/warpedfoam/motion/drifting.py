@@ -420,6 +420,9 @@ def _step(run: _Run, target: float) -> None:
     run.count += 1
     run.state = made.state
     _space_markers(run, energy)
+    if run.state.network is not before.network:
+        # markers have come or gone: what shrinks shows in the next step
+        before = run.state
     if options.t1:
         try:
             _change_topology(run, before)

@@ -54,6 +54,8 @@ DRAFT = 0.03
 SADDLE, KICK = 1e-6, 0.05
 #: Least share of exact steps that go to and fro, and how often in a row before they are shortened.
 LEAST_DAMPING, PATIENCE = 1.0 / 16.0, 2
+#: After so many, and below this residual, markers of clusters stay where they are for so many steps.
+STALLS, NEAR, STAY = 10, 1e-3, 60
 SLIPPED = (
     "stopped: the volumes no longer add up, so a film has slipped round the surface or a bubble has turned "
     "inside out; use more bubbles, volumes that differ less, or more marker vertices"
@@ -85,6 +87,8 @@ class _Run:
     last: np.ndarray = field(default_factory=lambda: np.zeros(0))
     damping: float = 1.0
     backs: int = 0
+    stalls: int = 0
+    stay: int = 0
 
     def snapshot(self) -> tuple[object, ...]:
         """What `restore` brings back."""
@@ -441,10 +445,17 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
         step = Step(step.vertices + side * KICK * mode, step.offsets, step.pressures)
         size = max(size, KICK)
     share = run.share * min(1.0, EXACT_STEP / max(size, 1e-300))
-    # markers make the matrix inexact: where that throws soft modes to and fro, shorter steps land between
+    # markers that follow make the matrix inexact: where that throws soft modes to and fro, shorter steps
+    # land between, and markers that stay make it exact
     back = run.last.shape == step.vertices.shape and now.force > 0.3 * run.past
     back = back and _cosine(step.vertices, run.last) < -0.5
     run.backs = run.backs + 1 if back else 0
+    run.stalls += back
+    if run.stalls > STALLS:
+        run.stalls, run.stay = 0, run.iteration + STAY
+    # beside a rim they would let a cluster slide off along a soft direction
+    if run.system.exterior is not None and run.system.cell.surface.rim is None:
+        run.system.loose = run.iteration >= run.stay or now.force > NEAR
     halve = run.backs >= PATIENCE
     run.damping = max(0.5 * run.damping, LEAST_DAMPING) if halve else min(2.0 * run.damping, 1.0)
     share *= run.damping

@@ -312,8 +312,8 @@ def relax_layers(ruled: Relaxation, layers: int, tolerance: float) -> LayeredRel
         message = f"converged in {iterations} steps from the ruled foam"
         if terms.contact_error > UNRESOLVED:
             message += (
-                f"; films are not resolved: they meet the plates up to {terms.contact_error:.2g} rad off a right "
-                "angle; take a higher order"
+                f"; films are not resolved: they meet the plates up to {terms.contact_error:.2g} rad off a "
+                "right angle; take a higher order"
             )
     elif done:
         message = "at rest, but the Hessian's inertia is not seen to be that of a minimum"
