@@ -22,6 +22,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 VENV = os.path.join(HERE, ".venv")
 BIN = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
 PYTHON = os.path.join(BIN, "python.exe" if os.name == "nt" else "python")
+ORDER = ["--no-loadscope-reorder"]
 STAMP = os.path.join(VENV, "warpedfoam-installed")
 
 
@@ -138,8 +139,9 @@ def test(arguments):
         ("ruff", [tool("ruff"), "check", "."]),
         ("mypy", [tool("mypy"), "--strict", "src"]),
         ("layers", [tool("lint-imports")]),
-        # a worker for each core, each with one thread for linear algebra; "-n 0" runs all in one process
-        ("pytest", [PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *arguments]),
+        # a worker for each core, each with one thread for linear algebra; "-n 0" runs all in one process.
+        # In their own order: by default files of few tests, some of which are long, would come last.
+        ("pytest", [PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *ORDER, *arguments]),
     ]
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
