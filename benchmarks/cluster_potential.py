@@ -52,6 +52,20 @@ def fit(columns: dict[str, np.ndarray], value: np.ndarray) -> tuple[dict[str, fl
     return powers, float(misfit)
 
 
+def orders(ends: np.ndarray) -> list[dict]:
+    """The same differences by films of growing order."""
+    table = []
+    for n in SIZES:
+        for order in (4, 6, 8, 10):
+            rows = energies("order", n, 0.5, 0.5, ends, order=order)
+            table += rows
+            inside = difference(rows)
+            print(
+                f"{n:3d} bubbles, p = {order:2d}: E(0) = {rows[0]['energy']:.12f}  E(180) − E(0) = {inside:.12f}"
+            )
+    return table
+
+
 def scales(table: list[dict], ends: np.ndarray) -> list[dict]:
     """Differences against gap, number and area of the bubbles, and the laws fitted to them."""
     scaling = []
@@ -89,10 +103,7 @@ def main(folder: str | Path = "data") -> None:
         rows = energies("phi", n, 0.5, 0.5, np.arange(0.0, 181.0, 30.0))
         table += rows
         print(f"{n:3d} bubbles: E(180) − E(0) = {difference(rows):.9f}   ({perf_counter() - start:.0f} s)")
-    for order in (4, 6, 8, 10, 12):
-        rows = energies("order", 7, 0.5, 0.5, ends, order=order)
-        table += rows
-        print(f"p = {order:2d}: E(0) = {rows[0]['energy']:.12f}  E(180) − E(0) = {difference(rows):.12f}")
+    table += orders(ends)
     for angle in np.arange(0.0, 91.0, 15.0):
         for n in (2, 7):
             options = {"hold": "both", "orientation": float(np.radians(angle))}
