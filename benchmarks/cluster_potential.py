@@ -59,10 +59,8 @@ def orders(ends: np.ndarray) -> list[dict]:
         for order in (4, 6, 8, 10):
             rows = energies("order", n, 0.5, 0.5, ends, order=order)
             table += rows
-            inside = difference(rows)
-            print(
-                f"{n:3d} bubbles, p = {order:2d}: E(0) = {rows[0]['energy']:.12f}  E(180) − E(0) = {inside:.12f}"
-            )
+            least, change = rows[0]["energy"], difference(rows)
+            print(f"{n:3d} bubbles, p = {order:2d}: E(0) = {least:.12f}  E(180) − E(0) = {change:.12f}")
     return table
 
 
