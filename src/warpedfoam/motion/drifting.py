@@ -315,24 +315,12 @@ def _recall(run: _Run, path: Path) -> None:
     run.foams, run.times, run.log, run.events = foams, times, [], []
     for note in kept:
         run.log += [(row[0], row[1], row[2], row[3]) for row in note["log"]]
-        run.events += [_event(entry) for entry in note["events"]]
+        run.events += [DriftEvent.from_record(entry) for entry in note["events"]]
     last = kept[-1]
     run.time, run.step, run.bound = times[-1], last["step"], last["bound"]
     run.count, run.rejected = last["count"], last["rejected"]
     run.state = run.stepper.state_of(foams[-1])
     run.noted = (len(run.log), len(run.events))
-
-
-def _event(entry: dict[str, Any]) -> DriftEvent:
-    x, y, z = entry["position"]
-    return DriftEvent(
-        **{
-            **entry,
-            "losers": tuple(entry["losers"]),
-            "gainers": tuple(entry["gainers"]),
-            "position": (x, y, z),
-        }
-    )
 
 
 def _travelled(

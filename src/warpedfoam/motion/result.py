@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,13 @@ class DriftEvent:
     position: tuple[float, float, float]
     energy_before: float
     energy_after: float
+
+    @classmethod
+    def from_record(cls, entry: dict[str, Any]) -> DriftEvent:
+        """From the plain values that a trajectory keeps."""
+        x, y, z = entry["position"]
+        lists = {name: tuple(entry[name]) for name in ("losers", "gainers")}
+        return cls(**{**entry, **lists, "position": (x, y, z)})
 
 
 @dataclass(frozen=True, eq=False)

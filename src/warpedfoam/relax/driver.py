@@ -221,7 +221,7 @@ def relax(
         is_minimum=run.is_minimum,
         iterations=run.iteration,
         events=tuple(run.events),
-        history=_history(run.rows),
+        history=RelaxationHistory.of_rows(run.rows),
         timings=MappingProxyType(dict(system.timings)),
         message=_message(converged, residuals, run, tol, limit),
         contacts=tuple(run.contacts),
@@ -303,18 +303,6 @@ def _note(run: _Run, lin: Linearised, exact: bool) -> None:
     now = lin.residuals
     energy = run.foam.tension * float(lin.area.sum())
     run.rows.append((run.iteration, energy, now.force, now.volume_error, len(run.events), exact))
-
-
-def _history(rows: list[tuple[int, float, float, float, int, bool]]) -> RelaxationHistory:
-    iteration, energy, residual, volume_error, n_t1, exact = zip(*rows, strict=True) if rows else [()] * 6
-    return RelaxationHistory(
-        frozen(np.array(iteration, dtype=np.int64)),
-        frozen(np.array(energy, dtype=np.float64)),
-        frozen(np.array(residual, dtype=np.float64)),
-        frozen(np.array(volume_error, dtype=np.float64)),
-        frozen(np.array(n_t1, dtype=np.int64)),
-        frozen(np.array(exact, dtype=np.bool_)),
-    )
 
 
 def _proximal_step(run: _Run, lin: Linearised) -> None:

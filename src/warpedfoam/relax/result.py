@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from warpedfoam.arrays import Bools, Floats, Ints
+import numpy as np
+
+from warpedfoam.arrays import Bools, Floats, Ints, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.moves.join import ContactEvent
 from warpedfoam.moves.t1 import T1Event
@@ -37,6 +39,13 @@ class RelaxationHistory:
     volume_error: Floats
     n_t1: Ints
     exact: Bools
+
+    @classmethod
+    def of_rows(cls, rows: list[tuple[int, float, float, float, int, bool]]) -> RelaxationHistory:
+        """From a row for each state, in the order of the attributes."""
+        kinds = (np.int64, np.float64, np.float64, np.float64, np.int64, np.bool_)
+        columns = zip(*rows, strict=True) if rows else [()] * len(kinds)
+        return cls(*(frozen(np.array(c, dtype=kind)) for c, kind in zip(columns, kinds, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
