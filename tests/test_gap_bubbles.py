@@ -128,3 +128,9 @@ def test_a_bubble_drifts_down_a_wedge():
     np.testing.assert_allclose(covered, -0.5 * slope, rtol=5e-3)
     assert moved.volume_errors.max() < 1e-10
     assert (np.diff(moved.step_energies) < 0.0).all()
+
+
+@pytest.mark.parametrize("formula", ["9**9**9**9", "1/0", "(-1)**0.5", "x/0", "log(0)", "1e400"])
+def test_formulas_without_a_finite_value_are_refused(formula):
+    with pytest.raises(ValueError, match="gap must be finite"):
+        wf.HeleShawCell(wf.Sphere(1.0), wf.FormulaGap(formula))

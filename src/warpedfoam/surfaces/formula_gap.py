@@ -130,7 +130,11 @@ def _value(node: ast.expr, places: Mapping[str, Any], functions: Mapping[str, Ca
         case ast.Name(id=name):
             return CONSTANTS[name] if name in CONSTANTS else places[name]
         case ast.BinOp(left=left, op=op, right=right):
-            return _BINARY[type(op)](_value(left, places, functions), _value(right, places, functions))
+            one, other = _value(left, places, functions), _value(right, places, functions)
+            if isinstance(one, float) and isinstance(other, float):
+                # NumPy's numbers overflow to inf, where Python's raise or turn complex
+                return float(_BINARY[type(op)](np.float64(one), np.float64(other)))
+            return _BINARY[type(op)](one, other)
         case ast.UnaryOp(op=op, operand=operand):
             return _UNARY[type(op)](_value(operand, places, functions))
         case ast.Call(func=ast.Name(id=name), args=args):
