@@ -26,8 +26,10 @@ from warpedfoam.arrays import (
 from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import ConvergenceError
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
+from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.studies.bubble import BubbleBetweenPlates, bubble_between_plates
 from warpedfoam.studies.rims import OverRim, disks_over_rim, require_on_surface
+from warpedfoam.surfaces.protocol import Layer, Surface
 from warpedfoam.theory import second_order_energy
 
 #: E of (volume, gap, k1, k2), the last two arrays of principal curvatures of the inner plate.
@@ -63,7 +65,8 @@ class GeometricPotential:
     triangles : (k, 3) int array or None
         Of the triangulation whose nodes the points are, if they cover the surface.
     lengths : (n,) array or None
-        Distance along the path, if the points are one.
+        Distance along the path, if the points are one: along the surface from each to the next, or straight
+        where they are too far apart for a film.
     """
 
     cell: HeleShawCell
@@ -163,12 +166,19 @@ def geometric_potential(
         name, given = ("points", points) if path is None else ("path", path)
         assert given is not None
         places = surface.project(as_points(given, name, minimum=1 if path is None else 2))
-    lengths = None
-    if path is not None:
-        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-        lengths = frozen(np.concatenate([[0.0], np.cumsum(steps)]))
+    lengths = None if path is None else _travelled(surface, places)
     out = _evaluate(between, amount, places, method, layers, hold)
     return replace(out, triangles=triangles, lengths=lengths)
+
+
+def _travelled(surface: Surface, places: Floats) -> Floats:
+    """Distances along a path, (n,), places being joined as the ends of a film of no offset are."""
+    tail = places[:-1]
+    straight = nearest_image(places[1:] - tail, surface.period)
+    steps = surface.arc_measure(tail, tail + straight, np.zeros((len(tail), 1)), Layer.surface())
+    # no film reaches as far as the other side of a level set
+    steps = np.where(np.isfinite(steps), steps, np.linalg.norm(straight, axis=1))
+    return frozen(np.concatenate([[0.0], np.cumsum(steps)]))
 
 
 def _evaluate(
