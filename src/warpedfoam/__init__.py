@@ -72,8 +72,18 @@ from warpedfoam.io import (
     write_vtm,
     write_vtp,
 )
-from warpedfoam.motion import Drift, DriftEvent, drift, resume_drift
-from warpedfoam.moves import ContactEvent, T1Event, add_markers, join, part, remove_markers, t1, wall_t1
+from warpedfoam.motion import (
+    Coarsening,
+    CoarseningEvent,
+    Drift,
+    DriftEvent,
+    coarsen,
+    drift,
+    gas_dissipation,
+    gas_flow,
+    resume_drift,
+)
+from warpedfoam.moves import ContactEvent, T1Event, add_markers, join, part, remove_markers, t1, t2, wall_t1
 from warpedfoam.network import CellNetwork, network_from_loops
 from warpedfoam.plot import (
     animate,
@@ -178,6 +188,8 @@ __all__ = [
     "ChargeEnergies",
     "ChargeProfile",
     "ClusterPotential",
+    "Coarsening",
+    "CoarseningEvent",
     "ContactEvent",
     "ConvergenceError",
     "Correlations",
@@ -244,12 +256,15 @@ __all__ = [
     "cluster_foam",
     "cluster_labels",
     "cluster_potential",
+    "coarsen",
     "correlations",
     "defects",
     "drift",
     "drift_path",
     "equilibrium_report",
     "foam_statistics",
+    "gas_dissipation",
+    "gas_flow",
     "geodesic_circle",
     "geodesic_distances",
     "geodesic_report",
@@ -294,6 +309,7 @@ __all__ = [
     "save_picture",
     "side_distribution",
     "t1",
+    "t2",
     "theory",
     "thomson_points",
     "voronoi_foam",
