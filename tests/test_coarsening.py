@@ -17,9 +17,9 @@ THIRD = np.pi / 3.0
 
 
 @cache
-def relaxed(kind: str, n: int = 40, seed: int = 3, gap: float = 0.01) -> wf.Foam:
+def relaxed(kind: str, n: int = 40, seed: int = 3, gap: float = 0.01, seeds: str = "blue") -> wf.Foam:
     surface = {"sphere": wf.Sphere(1.0), "torus": wf.Torus(3.0, 1.0), "cylinder": wf.Cylinder(1.0, 3.0)}[kind]
-    found = wf.relax(wf.voronoi_foam(wf.HeleShawCell(surface, gap), n, seed=seed, seeds="blue"))
+    found = wf.relax(wf.voronoi_foam(wf.HeleShawCell(surface, gap), n, seed=seed, seeds=seeds))
     assert found.converged
     return found.foam
 
@@ -43,14 +43,14 @@ def test_von_neumanns_law_on_a_sphere() -> None:
 
 
 def test_von_neumanns_law_on_a_torus() -> None:
-    """With the curvature's integral, in the limit of thin gaps: the fault falls as the gap."""
+    """With the curvature's integral, in the limit of thin gaps: the fault falls as the gap squared."""
     faults = []
     for gap in (0.02, 0.01):
         foam = wf.relax(relaxed("torus", 60, gap=gap), order=8).foam
         law = THIRD * (foam.network.sides - 6) + foam.bubble_curvatures
         faults.append(np.abs(wf.gas_flow(foam) / gap - law).max())
-    assert faults[1] < 0.02
-    assert faults[0] / faults[1] == pytest.approx(2.0, abs=0.1)
+    assert faults[1] < 1e-3
+    assert faults[0] / faults[1] == pytest.approx(4.0, abs=0.1)
 
 
 def test_regular_foams_on_a_sphere_stay_as_they_are() -> None:
@@ -74,7 +74,7 @@ def test_energy_goes_as_gas_flows() -> None:
 
 
 def test_a_lone_bubble_gives_its_gas_away_with_order_two() -> None:
-    """dA/dt = κγ f²/v (A − 2π) on the unit sphere, so A = 2π − (2π − A₀) exp(κγ t f²/v)."""
+    """dA/dt = κγ f²/v² (A − 2π) on the unit sphere, so A = 2π − (2π − A₀) exp(κγ t f²/v²)."""
     gap = 0.1
     cell = wf.HeleShawCell(wf.Sphere(1.0), gap)
     foam = wf.cluster_foam(cell, 1, volumes=0.2, order=8)
@@ -84,9 +84,9 @@ def test_a_lone_bubble_gives_its_gas_away_with_order_two() -> None:
         made = wf.coarsen(foam, duration=0.2, every=0.2, step=0.2 / steps)
         assert made.n_steps == steps
         areas = [made.foams[k].bubble_areas[0] for k in (0, -1)]
-        exact = 2.0 * np.pi - (2.0 * np.pi - areas[0]) * np.exp(0.2 * film**2 / depth**1)
+        exact = 2.0 * np.pi - (2.0 * np.pi - areas[0]) * np.exp(0.2 * film**2 / depth**2)
         faults.append(abs(areas[1] - exact))
-    assert faults[-1] < 2e-4
+    assert faults[-1] < 5e-4
     orders = np.log2(np.array(faults[:-1]) / faults[1:])
     assert (np.abs(orders - 2.0) < 0.35).all(), orders
 
@@ -137,9 +137,9 @@ def test_time_goes_as_length_squared() -> None:
 
 def test_smaller_steps_change_less_and_less() -> None:
     """With T1s and T2s on the way: their times are of first order in the step."""
-    foam = relaxed("sphere", 24, seed=5)
+    foam = relaxed("sphere", 24, seed=5, seeds="random")
     found = [
-        wf.coarsen(foam, duration=0.5, every=0.5, tolerance=t, vanish=1e-3)
+        wf.coarsen(foam, duration=0.8, every=0.8, tolerance=t, vanish=1e-3)
         for t in (4e-2, 1e-2, 2.5e-3, 1e-4)
     ]
     assert {made.foam.n_bubbles for made in found} == {found[0].foam.n_bubbles}
@@ -174,20 +174,22 @@ def test_any_bubble_may_vanish(kind: str) -> None:
 
 def test_a_lens_on_a_film_leaves_the_film() -> None:
     """Two films between the bubbles on either side become one with the lens's gap closed."""
-    made = run()
-    foam = wf.relax(wf.t2(made.foam, 0)).foam
-    shrunk = _lens()
-    assert shrunk.network.sides[0] == 2
-    left = wf.t2(shrunk, 0)
-    assert left.network.n_films == shrunk.network.n_films - 3
-    assert left.network.n_vertices == shrunk.network.n_vertices - 2
-    assert wf.relax(left).converged
-    assert foam.n_bubbles == 19
+    foam = _lens()
+    assert foam.network.sides.tolist() == [2, 4, 4, 2]
+    left = wf.t2(foam, 0)
+    # a marker stays: without it the film would be half a turn
+    assert left.network.n_films == foam.network.n_films - 2
+    assert len(left.network.markers) == len(foam.network.markers) + 1
+    assert left.network.sides.tolist() == [2, 2, 2]
+    # lunes of 120 degrees, if all are as large
+    thirds = replace(left, target_volumes=np.full(3, left.cell.volume / 3.0))
+    found = wf.relax(thirds)
+    assert found.converged
+    assert found.foam.film_lengths.sum() == pytest.approx(3.0 * np.pi, rel=1e-9)
 
 
 def _lens() -> wf.Foam:
-    """Five bubbles on a sphere, the first with two sides: a prism, one edge of which is opened."""
-    # three lunes round an axis, the first film opened by a lens at the equator
+    """Three lunes round an axis, the film between two of them opened by a lens at the equator."""
     a = np.radians([-8.0, 8.0])
     points = np.array(
         [
@@ -202,7 +204,6 @@ def _lens() -> wf.Foam:
         points = np.vstack([points, [np.cos(angle), np.sin(angle), 0.0]])
     # the other two films bear markers, since they are half turns
     north, south, low, high, east, west = range(6)
-    nexts: dict[tuple[int, int], int] = {}
     films = [
         (low, high),
         (high, low),
@@ -213,13 +214,11 @@ def _lens() -> wf.Foam:
         (north, west),
         (west, south),
     ]
-    for k, (tail, head) in enumerate(films):
-        nexts[(tail, head)] = 2 * k
     loops = {
         0: [0, 2],
-        1: [1, 4, 8, 10, 6],
-        2: [3, 7, 15, 13, 5],
-        3: [12, 14, 11, 9],
+        1: [5, 1, 7, 11, 9],
+        2: [6, 3, 4, 12, 14],
+        3: [8, 10, 15, 13],
     }
     following = np.empty(16, dtype=int)
     bubble = np.empty(16, dtype=int)

@@ -68,10 +68,11 @@ def rewire_t2(network: CellNetwork, bubble: int) -> tuple[CellNetwork, Ints, Int
     gone = np.zeros(len(following), dtype=np.bool_)
     gone[halves] = gone[outer] = True
     # what came before a film of the bubble is followed by what comes after all of them
-    ahead = following[outer]
+    beside = outer[~gone[before[outer]]]
+    ahead = following[beside]
     while gone[ahead].any():
         ahead = np.where(gone[ahead], following[ahead], ahead)
-    following[before[outer]] = ahead
+    following[before[beside]] = ahead
     at = np.unique(network.origin[halves])
     origin[np.isin(origin, at)] = at[0]
     stays = ~gone
@@ -90,6 +91,8 @@ def rewire_t2(network: CellNetwork, bubble: int) -> tuple[CellNetwork, Ints, Int
     return out, np.flatnonzero(stays[0::2]), np.flatnonzero(lives)
 
 
+#: Two films become one if they are not longer together, in bubble sizes: a marker stays on half a turn.
+MERGED = 1.5
 #: Films' corners inside and walls of bubbles that can vanish.
 VANISHING = frozenset({(3, 0), (2, 0), (0, 0), (1, 1), (0, 1)})
 
@@ -150,7 +153,9 @@ def t2(foam: Foam, bubble: int) -> Foam:
     if at[0] in vertices:
         merged = np.searchsorted(vertices, at[:1])
         if network.vertex_degrees[merged[0]] == 2 and removable(network, merged)[0]:
-            layout, _ = merge(surface, layout, merged)
+            beside = films[np.flatnonzero(network.origin == merged[0]) >> 1]
+            if shed.film_lengths[beside].sum() < MERGED * foam.bubble_size:
+                layout, _ = merge(surface, layout, merged)
     exterior = foam.exterior
     return replace(
         foam,
