@@ -166,6 +166,12 @@ def test_any_bubble_may_vanish(kind: str) -> None:
         assert fewer.network.charges.sum() == 6 * chi
         assert fewer.network.euler_characteristic == chi
         assert fewer.target_volumes.sum() == pytest.approx(foam.cell.volume, rel=1e-12)
+        gain = fewer.target_volumes - np.delete(foam.target_volumes, bubble)
+        network = foam.network
+        beside = np.unique(network.bubble[np.flatnonzero(network.bubble == bubble) ^ 1])
+        near = np.isin(fewer.bubble_ids, foam.bubble_ids[beside])
+        assert (gain[near] > 0.0).all()
+        assert np.abs(gain[~near]).max() < 1e-12 * foam.cell.volume
         found = wf.relax(fewer)
         assert found.converged, found.message
         foam = found.foam
@@ -272,13 +278,13 @@ def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
 
     def stop(_stage: str, _fraction: float) -> None:
         seen.append(_fraction)
-        if len(seen) == 9:
+        if len(seen) == 20:
             raise _Stop
 
     with pytest.raises(_Stop):
         wf.coarsen(foam, trajectory=path, progress=stop, **options)
     with wf.Trajectory(path) as frames:
-        assert 1 <= len(frames) < len(whole.foams)
+        assert 3 <= len(frames) < len(whole.foams)
     again = wf.coarsen(foam, trajectory=path, resume=True, **options)
     assert again.times.tolist() == whole.times.tolist()
     assert again.foam.vertex_points.tobytes() == whole.foam.vertex_points.tobytes()
