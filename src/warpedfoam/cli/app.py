@@ -132,7 +132,7 @@ def _add_command(
     shared: Mapping[str, tuple[Any, Any]],
     do: Callable[[dict[str, Any], Mapping[str, Any]], None],
 ) -> None:
-    from warpedfoam.studies.sizes import SIZES
+    from warpedfoam.sizes import SIZES
 
     sizes = SIZES[kind]
     plain = inspect.Parameter.KEYWORD_ONLY
