@@ -144,6 +144,7 @@ if TYPE_CHECKING:
         Cylinder,
         Ellipsoid,
         FlatTorus,
+        Formula,
         FormulaGap,
         GapField,
         Graph,
@@ -198,6 +199,7 @@ __all__ = [
     "FlatTorus",
     "Foam",
     "FoamStatistics",
+    "Formula",
     "FormulaGap",
     "GapField",
     "GeodesicCircle",
@@ -358,7 +360,7 @@ _HOMES = {
         "run_ensemble thomson_points write_potential_csv"
     ),
     "surfaces": (
-        "Catenoid Cylinder Ellipsoid FlatTorus FormulaGap GapField Graph Implicit LevelSurface LinearGap "
+        "Catenoid Cylinder Ellipsoid FlatTorus Formula FormulaGap GapField Graph Implicit LevelSurface LinearGap "
         "MeshSurface Revolution SchwarzP ShiftedSphereGap ShiftedTubeGap Sphere Surface Torus "
         "TriangleMesh mesh_report read_mesh"
     ),

@@ -283,7 +283,8 @@ def _described(value: object, place: str, arrays: Arrays) -> dict[str, Any]:
         elif isinstance(item, tuple) and all(isinstance(x, (int, float)) for x in item):
             fields[field.name] = {"tuple": list(item)}
         else:
-            raise TypeError(f"cannot save {where}: it is a {type(item).__name__}")
+            hint = "; surfaces made by from_formula can be saved" if callable(item) else ""
+            raise TypeError(f"cannot save {where}: it is a {type(item).__name__}{hint}")
     return {"class": type(value).__name__, "fields": fields}
 
 
