@@ -360,8 +360,8 @@ _HOMES = {
         "run_ensemble thomson_points write_potential_csv"
     ),
     "surfaces": (
-        "Catenoid Cylinder Ellipsoid FlatTorus Formula FormulaGap GapField Graph Implicit LevelSurface LinearGap "
-        "MeshSurface Revolution SchwarzP ShiftedSphereGap ShiftedTubeGap Sphere Surface Torus "
+        "Catenoid Cylinder Ellipsoid FlatTorus Formula FormulaGap GapField Graph Implicit LevelSurface "
+        "LinearGap MeshSurface Revolution SchwarzP ShiftedSphereGap ShiftedTubeGap Sphere Surface Torus "
         "TriangleMesh mesh_report read_mesh"
     ),
     "tessellate": "GeodesicDistances HeatGeodesics geodesic_distances geodesic_report voronoi_foam",
