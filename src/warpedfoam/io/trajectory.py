@@ -45,6 +45,8 @@ LOOKS, PAUSE = 5, 0.05
 #: Pauses of a writer that finds its file being read.
 WAITS = 100
 _PURPOSE = "HDF5"
+#: The oldest HDF5 with a single-writer mode: what a newer one would write, older programs cannot open.
+LIBRARIES = ("v110", "v110")
 _CHUNK = 4096
 
 Arrays = dict[str, NDArray[Any]]
@@ -190,7 +192,7 @@ class TrajectoryWriter:
             self._time = float(old.times[-1]) if len(old) else -np.inf
         for look in range(WAITS + 1):
             try:
-                self._file = self._h5py.File(target, "r+", libver="latest")
+                self._file = self._h5py.File(target, "r+", libver=LIBRARIES)
                 break
             except BlockingIOError:
                 # somebody is reading it: not for long
@@ -323,7 +325,7 @@ class Trajectory:
 
 def _created(h5py: Any, path: Path, cell: tuple[str, Arrays]) -> Any:
     """A new file in single-writer mode, all its datasets there."""
-    file = h5py.File(path, "x", libver="latest", userblock_size=USER_BLOCK)
+    file = h5py.File(path, "x", libver=LIBRARIES, userblock_size=USER_BLOCK)
     try:
         file.attrs["format"] = FORMAT
         file.attrs["version"] = VERSION
