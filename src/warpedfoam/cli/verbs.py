@@ -58,6 +58,10 @@ def check(
     repair: Annotated[
         str | None, typer.Option("--repair", metavar="FILE", help="Write a safely repaired mesh (PLY).")
     ] = None,
+    close_holes: Annotated[
+        int | None,
+        typer.Option("--close-holes", help="Repair closes holes of up to so many edges."),
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -66,7 +70,9 @@ def check(
     with ending_well(debug), signals():
         from warpedfoam.cli.checking import check_file
 
-        sound, text, facts = check_file(file, gap=gap, n_bubbles=n_bubbles, repair=repair)
+        sound, text, facts = check_file(
+            file, gap=gap, n_bubbles=n_bubbles, repair=repair, close_holes=close_holes
+        )
         if as_json or not quiet:
             print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
     if not sound:
