@@ -364,6 +364,21 @@ def test_in_the_dark(browser, tmp_path):
     assert scene(browser)[3, 3].tolist() == [255, 255, 255]
 
 
+def rested(browser):
+    """Once the picture has stopped and been drawn in all detail."""
+    browser.ask("new Promise((r) => setTimeout(r, 250))")
+    browser.settle()
+    return browser.ask("foamViewer.drawn()")
+
+
+def held(browser, *path):
+    """Drag along a path and do not let go; what the pictures meanwhile were drawn of."""
+    for kind, (x, y) in zip(["mousePressed"] + ["mouseMoved"] * len(path), (path[0], *path), strict=True):
+        browser.mouse_event(kind, (x, y))
+    browser.settle()
+    return browser.ask("foamViewer.drawn()")
+
+
 def test_two_thousand_bubbles(browser, tmp_path):
     """Right where it is clicked and small in triangles; `benchmarks/view_frames.py` has the times."""
     foam = sphere_foam(2000, even=True)
@@ -382,3 +397,77 @@ def test_two_thousand_bubbles(browser, tmp_path):
     assert len(times) == 3
     cost = browser.ask("foamViewer.cost()")
     assert 0.0 < cost["picture"] < cost["frame"]
+
+
+def test_a_moving_picture_is_drawn_in_less(browser, tmp_path):
+    """Fewer triangles and no smoothing while it moves; all of it at rest; picking does not mind."""
+    foam = sphere_foam(2000, even=True)
+    shown(browser, tmp_path, foam)
+    first, pixels = rested(browser), scene(browser)
+    all_triangles = 2 * foam.network.n_films * 2
+    # what faces away is not drawn: somewhat more than half of the sphere's bubbles are left
+    assert 0.45 * all_triangles < first["triangles"] < 0.7 * all_triangles
+    assert first["smooth"]
+    assert not first["moving"]
+    x, y = where(browser, 2.0 * axis(25.0, -60.0))
+    during = held(browser, *((x + 8 * k, y + 3 * k) for k in range(8)))
+    assert during["moving"]
+    assert not during["smooth"]
+    assert during["triangles"] <= 0.6 * first["triangles"]
+    # at most one picture for each that the window shows, however many events
+    burst = browser.ask(
+        """new Promise(async (done) => {
+          const before = (await foamViewer.drawn()).pictures;
+          const canvas = document.getElementById('scene');
+          let shown = 0, k = 0;
+          const step = () => {
+            for (let j = 0; j < 20; j++)
+              canvas.dispatchEvent(new WheelEvent('wheel', { deltaY: j % 2 ? 3 : -3 }));
+            if (++k < 6) { shown++; requestAnimationFrame(step); }
+            else requestAnimationFrame(async () => {
+              done([(await foamViewer.drawn()).pictures - before, shown]);
+            });
+          };
+          step();
+        })"""
+    )
+    assert burst[0] <= burst[1] + 2
+    # still held, at rest: all detail again, and then nothing more
+    after = rested(browser)
+    assert not after["moving"]
+    assert after["smooth"]
+    assert after["triangles"] > 1.6 * during["triangles"]
+    assert (after["width"], after["height"]) == (first["width"], first["height"])
+    assert rested(browser)["pictures"] == after["pictures"]
+    browser.mouse_event("mouseReleased", (x, y))
+    for bubble in front(foam, axis(25.0, -60.0))[:2]:
+        browser.mouse(where(browser, foam.bubble_centres[bubble]))
+        check_numbers(browser, foam, bubble)
+    # a tap right after a drag, before it has rested
+    held(browser, (x, y), (x + 30, y), (x + 60, y))
+    browser.mouse_event("mouseReleased", (x, y))
+    bubble = front(foam, axis(25.0, -60.0))[4]
+    browser.mouse(where(browser, foam.bubble_centres[bubble]))
+    check_numbers(browser, foam, bubble)
+    browser.key("Escape")
+    browser.ask("document.getElementById('home').click()")
+    rested(browser)
+    # but for the outline of what has the focus
+    np.testing.assert_array_equal(scene(browser)[3:-3, 3:-3], pixels[3:-3, 3:-3])
+
+
+def test_what_is_out_of_the_window_is_not_drawn(browser, tmp_path):
+    """Zoomed in: all detail, of the few bubbles in sight."""
+    foam = sphere_foam(2000, even=True)
+    shown(browser, tmp_path, foam)
+    box = browser.ask(CANVAS)
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    for _ in range(6):
+        browser.wheel(middle, -200.0)
+    told = rested(browser)
+    assert told["level"] == 0
+    assert told["triangles"] < 0.1 * 2 * foam.network.n_films * 4 * 3
+    assert (scene(browser) != WHITE).any(axis=2).all()
+    for bubble in front(foam, axis(25.0, -60.0))[:3]:
+        browser.mouse(where(browser, foam.bubble_centres[bubble]))
+        check_numbers(browser, foam, bubble)
