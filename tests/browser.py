@@ -225,6 +225,10 @@ class Browser:
         self._send("Input.dispatchKeyEvent", type="keyUp", **common)
         self.settle()
 
+    def paper(self) -> bytes:
+        """The page as it is printed: a PDF."""
+        return base64.b64decode(self._send("Page.printToPDF", printBackground=False)["data"])
+
     def screenshot(self, path: Path | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
         """Pixels (height, width, 3) of the window; also written to ``path``."""
         import io

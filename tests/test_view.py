@@ -352,6 +352,7 @@ def test_detail_falls_with_bubbles_and_frames():
         ({"foams": [lone_bubble(), None]}, TypeError, r"foams\[1\] must be a Foam"),
         ({"color_by": "taste"}, ValueError, "color_by"),
         ({"color_by": "pressure"}, ValueError, "relax them first"),
+        ({"color_by": "gap"}, ValueError, "not parallel"),
         ({"title": 5}, TypeError, "title must be a string"),
         ({"labels": ["a", "b"]}, ValueError, "1 foams, 2 labels"),
         ({"labels": "a"}, TypeError, "labels must be a sequence"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -362,6 +363,66 @@ def test_in_the_dark(browser, tmp_path):
     assert scene(browser)[3, 3].tolist() == [0x17, 0x18, 0x1C]
     browser.ask("document.getElementById('theme').click()")
     assert scene(browser)[3, 3].tolist() == [255, 255, 255]
+
+
+def test_on_paper(browser, tmp_path):
+    """One page, white, with the picture in it and none of the controls."""
+    browser.dark(True)
+    shown(browser, tmp_path, sphere_foam(40))
+    raw = browser.paper()
+    assert raw.count(b"/Type /Page\n") == 1
+    box = browser.ask(CANVAS)
+    width, height = browser.ask("(({ width, height }) => [width, height])(document.getElementById('paper'))")
+    assert [width, height] == pytest.approx([2 * box["width"], 2 * box["height"]], abs=1)
+    assert re.search(rb"/Subtype /Image\s/Width %d\s/Height %d\s" % (width, height), raw)
+    copied = """(() => {
+      const paper = document.getElementById('paper'), at = paper.getContext('2d');
+      const { data } = at.getImageData(0, 0, paper.width, paper.height);
+      let white = 0;
+      for (let k = 0; k < data.length; k += 4) white += data[k] + data[k + 1] + data[k + 2] === 765;
+      return [white / (data.length / 4), [...data.slice(0, 4)]];
+    })()"""
+    white, corner = browser.ask(copied)
+    assert corner == [255, 255, 255, 255]
+    # the ball fills the narrower side but for 4 %
+    narrow, wide = sorted((box["width"], box["height"]))
+    assert 1 - white == pytest.approx(np.pi / 4 * narrow / wide / 1.04**2, rel=0.15)
+    assert scene(browser)[3, 3].tolist() == [0x17, 0x18, 0x1C]
+
+
+def test_long_labels_do_not_push_controls_out(browser, tmp_path):
+    browser.window(390, 844, dots=3, phone=True)
+    words = "a step of which there is very much more to say than a phone has room for"
+    title = "</script><script>document.title = 'broken'</script>"
+    shown(browser, tmp_path, [sphere_foam(12), sphere_foam(14)], labels=[words, "<b>2</b>"], title=title)
+    inside = """['play', 'frame', 'speed', 'frame-label'].map((id) => {
+      const box = document.getElementById(id).getBoundingClientRect();
+      return box.left >= 0 && box.right <= innerWidth && box.width > 30 && box.bottom <= innerHeight;
+    })"""
+    assert browser.ask(inside) == [True] * 4
+    assert browser.ask("document.documentElement.scrollWidth") <= 390
+    label = "document.getElementById('frame-label').textContent"
+    assert browser.ask(label) == f"{words} (1/2)"
+    assert browser.ask("[document.title, document.querySelector('h1').textContent]") == [title, title]
+    browser.ask("foamViewer.show(1)")
+    assert browser.ask(label) == "<b>2</b> (2/2)"
+
+
+def test_gaps_that_vary_are_told(browser, tmp_path):
+    cell = wf.HeleShawCell(wf.Torus(3.0, 1.2), gap=lambda x: 0.2 + 0.02 * x[:, 0])
+    foam = wf.voronoi_foam(cell, n_bubbles=40, seeds="lattice")
+    shown(browser, tmp_path, foam, color_by="gap")
+    at_centres = 0.2 + 0.02 * foam.bubble_centres[:, 0]
+    ends = browser.ask("[...document.querySelectorAll('.ends span')].map((s) => s.textContent)")
+    assert number(ends[0]) == pytest.approx(at_centres.min(), rel=1e-3)
+    assert number(ends[-1]) == pytest.approx(at_centres.max(), rel=1e-3)
+    browser.ask("foamViewer.pick(3)")
+    assert number(numbers(browser)[1]["gap"]) == pytest.approx(at_centres[3], rel=1e-4)
+    least, most = re.findall(
+        r"gap ([\d.]+) to ([\d.]+)", browser.ask("document.getElementById('frame-facts').textContent")
+    )[0]
+    assert float(least) == pytest.approx(0.2 - 0.02 * 4.2, rel=0.01)
+    assert float(most) == pytest.approx(0.2 + 0.02 * 4.2, rel=0.01)
 
 
 def rested(browser):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from warpedfoam.arrays import as_choice
+from warpedfoam.arrays import Floats, as_choice
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 from warpedfoam.io.colours import CHARGE_RANGE, FILM_COLOUR, OUTSIDE_COLOUR
@@ -59,7 +59,8 @@ def write_view(
         frame; a picked bubble is followed by its id, and colours mean the same values in all frames.
     color_by : str, optional
         What to show first: ``"charge"``, ``"sides"``, ``"area"``, ``"volume"``, ``"pressure"``,
-        ``"curvature"`` (Gaussian, mean of each bubble), ``"surface"`` (Gaussian, point by point) or ``"id"``.
+        ``"curvature"`` (Gaussian, mean of each bubble), ``"surface"`` (Gaussian, point by point),
+        ``"gap"`` where it varies, or ``"id"``.
     title : str, optional
         In place of the number of bubbles and the surface.
     labels : sequence of str, optional
@@ -76,7 +77,8 @@ def write_view(
         If ``foams`` holds anything but foams, or texts are no strings.
     ValueError
         If there is no foam, the path has another ending, ``color_by`` is unknown or asks for pressures that
-        some foam does not have, or there are not as many labels as foams.
+        some foam does not have or a gap that varies where none does, or there are not as many labels as
+        foams.
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
 
@@ -105,6 +107,10 @@ def write_view(
     if name == "pressure" and any(foam.pressures is None for foam in frames):
         raise ValueError(
             "color_by='pressure' needs pressures in every foam: relax them first (warpedfoam.relax)"
+        )
+    if name == "gap" and all(foam.cell.parallel for foam in frames):
+        raise ValueError(
+            "color_by='gap' needs plates that are not parallel: here the gap is the same everywhere"
         )
     words = _words(labels, len(frames))
     if title is not None and not isinstance(title, str):
@@ -225,6 +231,10 @@ def _held(foam: Foam) -> int:
     return foam.n_bubbles - (foam.exterior is not None)
 
 
+def _least_and_most(values: Sequence[float] | Floats) -> list[float]:
+    return [float(min(values)), float(max(values))]
+
+
 def _first_view(foam: Foam, drawn: Geometry) -> dict[str, float]:
     """Elevation and azimuth in degrees: from the side and a little above, or from above what lies flat.
 
@@ -259,7 +269,9 @@ def _frame_facts(foam: Foam, meshes: Sequence[tuple[Geometry, Chunks]], side: fl
         "bubbles": foam.n_bubbles,
         "held": _held(foam),
         "energy": foam.energy,
-        "gap": foam.cell.mean_gap,
+        "gap": _least_and_most(
+            [foam.cell.mean_gap] if foam.cell.parallel else foam.cell.gaps(meshes[0][0].points)
+        ),
         "size": foam.bubble_size,
         "pull": min(_PULL * foam.bubble_size, _MOST_PULL * side),
         "sink": max(float(mesh.sunk.max()) for mesh, _ in meshes),

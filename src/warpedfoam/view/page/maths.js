@@ -109,6 +109,12 @@ function facing(axes, direction) {
   return turnedAxes(axes, own, Math.atan2(s, c));
 }
 
+/** A number of a colour bar, with four digits. */
+const brief = (x) => written(Number(x.toPrecision(4)));
+
+/** A value, or two and what is between them. */
+const between = (low, high) => (low === high ? written(low) : `${brief(low)} to ${brief(high)}`);
+
 /** A number for a reader, with six digits. */
 function written(x) {
   if (!Number.isFinite(x)) return "–";

@@ -16,6 +16,7 @@ class Viewer {
     this.coarse = 1; // share of the dots that a moving picture has
     this.moved = 0;
     this.turning = false;
+    this.size = [1, 1];
     this.scalar = facts.scalars.find((item) => item.name === facts.colorBy);
   }
 
@@ -66,7 +67,8 @@ class Viewer {
   drawn() {
     this.pending = null;
     const { clientWidth, clientHeight } = this.canvas;
-    this.painter.resize(clientWidth, clientHeight, this.dots);
+    if (clientWidth && clientHeight) this.size = [clientWidth, clientHeight]; // none while it is printed
+    this.painter.resize(...this.size, this.dots);
     this.painter.draw(this.camera, this.look, this.moves);
     this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
   }
@@ -138,10 +140,11 @@ class Viewer {
   told() {
     const { frame, place, facts, number } = this, about = frame.facts;
     byId("frame-facts").textContent =
-      `${about.held} bubbles, energy ${written(about.energy)}, gap ${written(about.gap)}`;
+      `${about.held} bubbles, energy ${written(about.energy)}, gap ${between(...about.gap)}`;
     byId("frame").value = number;
     byId("frame").setAttribute("aria-valuetext", about.label);
-    byId("frame-label").textContent = `${about.label} (${number + 1}/${facts.frames.length})`;
+    const place_in_all = ` (${number + 1}/${facts.frames.length})`;
+    byId("frame-label").replaceChildren(element("span", { title: about.label }, about.label), place_in_all);
     byId("unpick").hidden = this.pickedId === null;
     if (this.pickedId !== null) byId("find-id").value = String(this.pickedId);
     const gone = element("p", { class: "hint" }, `There is no bubble ${this.pickedId} in this frame.`);
@@ -212,7 +215,18 @@ class Viewer {
       this.coloured();
       this.redraw();
     });
+    window.addEventListener("beforeprint", () => this.printed());
     if (facts.frames.length > 1) this.player();
+  }
+
+  /** A copy of the picture on white, which printers get: what graphics cards draw does not stay. */
+  printed() {
+    const { canvas } = this, paper = byId("paper"), dots = Math.max(window.devicePixelRatio || 1, 2);
+    this.painter.resize(...this.size, dots);
+    this.painter.draw(this.camera, { ...this.look, ground: [1, 1, 1], dots });
+    Object.assign(paper, { width: canvas.width, height: canvas.height });
+    paper.getContext("2d").drawImage(canvas, 0, 0);
+    this.redraw();
   }
 
   home() {
