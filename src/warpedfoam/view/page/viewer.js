@@ -1,5 +1,6 @@
 // The page: state, drawing when something has changed, and the controls.
 const SLOW = 45; // milliseconds between pictures of a movement, above which they are drawn in fewer dots
+const HIDDEN = 2000; // nobody looked
 const MOVING_DOTS = 2; // in a pixel of the page at most, while the picture moves
 const REST = 150; // milliseconds after which what has stopped is drawn in all detail
 
@@ -14,7 +15,6 @@ class Viewer {
     this.number = 0;
     this.pickedId = null;
     this.coarse = 1; // share of the dots that a moving picture has
-    this.moved = 0;
     this.turning = false;
     this.size = [1, 1];
     this.scalar = facts.scalars.find((item) => item.name === facts.colorBy);
@@ -70,20 +70,23 @@ class Viewer {
     if (clientWidth && clientHeight) this.size = [clientWidth, clientHeight]; // none while it is printed
     this.painter.resize(...this.size, this.dots);
     this.painter.draw(this.camera, this.look, this.moves);
+    // the window asks for the next picture once this one is drawn, however often fingers move
+    const began = performance.now();
+    if (this.moves) requestAnimationFrame(() => this.paced(performance.now() - began));
     this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
   }
 
-  /** The picture has moved: fewer dots if pictures come too slowly, more if they come fast. */
   moving() {
-    const now = performance.now(), pause = now - this.moved;
-    this.moved = now;
-    if (this.turning && pause < REST) {
-      this.pace = 0.7 * (this.pace ?? pause) + 0.3 * pause;
-      if (this.pace > SLOW) this.coarse = Math.max(0.4, 0.8 * this.coarse), this.pace = SLOW;
-      else if (this.pace < 0.5 * SLOW) this.coarse = Math.min(1, 1.02 * this.coarse);
-    } else this.pace = undefined;
     this.stirred();
     this.redraw();
+  }
+
+  /** A picture of a movement took so long: fewer dots if pictures come too slowly, more if they come fast. */
+  paced(took) {
+    if (took > HIDDEN) return;
+    this.pace = 0.7 * (this.pace ?? took) + 0.3 * took;
+    if (this.pace > SLOW) this.coarse = Math.max(0.4, 0.8 * this.coarse), this.pace = SLOW;
+    else if (this.pace < 0.5 * SLOW) this.coarse = Math.min(1, 1.02 * this.coarse);
   }
 
   /** Until it has rested for a while. */
