@@ -16,7 +16,7 @@ import warpedfoam as wf
 from warpedfoam.cli.app import app
 from warpedfoam.io.colours import COLOR_CHOICES, bubble_colours
 from warpedfoam.io.patches import bubble_patches
-from warpedfoam.plot import foam_picture, projection
+from warpedfoam.plot import painting, projection
 from warpedfoam.view.chunks import in_chunks, parts_of_bubbles
 from warpedfoam.view.document import SCRIPTS
 from warpedfoam.view.frames import packed, unpacked
@@ -283,7 +283,7 @@ def test_shading_is_that_of_the_pictures():
     """The shader repeats numbers of `plot`, which it cannot import."""
     text = (PAGE / "shaders.js").read_text(encoding="utf-8")
     painter = (PAGE / "painter.js").read_text(encoding="utf-8")
-    assert f"mix(vec3({foam_picture.BACK_GREY}), colour, {foam_picture.BACK_SHARE})" in text
+    assert f"mix(vec3({painting.BACK_GREY}), colour, {painting.BACK_SHARE})" in text
     assert f"{projection._AMBIENT} + {1 - projection._AMBIENT:.2f} * clamp" in text
     assert f"unit({projection._LIGHT.tolist()})" in painter
 
