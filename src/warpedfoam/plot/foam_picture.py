@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Surfaces that are called after somebody.
-PROPER = {"SchwarzP": "Schwarz P surface"}
+# Surfaces that are called otherwise than their classes.
+PROPER = {"SchwarzP": "Schwarz P surface", "Graph": "landscape", "Revolution": "surface of revolution"}
 
 
 def plot_foam(

@@ -21,8 +21,8 @@ from warpedfoam.view.frames import bounding_cube, frame_arrays, packed
 from warpedfoam.view.geometry import Geometry, detail, geometry
 from warpedfoam.view.scalars import SCALARS, Scalar, bubble_scalars
 
-# Surfaces that are called after somebody.
-_PROPER = {"SchwarzP": "Schwarz P surface"}
+# Surfaces that are called otherwise than their classes.
+_PROPER = {"SchwarzP": "Schwarz P surface", "Graph": "landscape", "Revolution": "surface of revolution"}
 #: Version of the data in the page; its scripts are written beside it and fit.
 VERSION = 1
 SUFFIXES = (".html", ".htm")
