@@ -16,6 +16,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 
 OLDEST = (3, 11)
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -110,9 +111,9 @@ def install(extra=""):
     if want in done or installed_for("[dev]") in done:  # which has all the others
         return
     say("installing warpedfoam%s and what it needs (once; takes a minute or two)" % extra)
-    done = subprocess.call(
-        [*pip_command(), "install", "--quiet", "--disable-pip-version-check", "--editable", HERE + extra]
-    )
+    # bytecode comes with the first import: most of what is installed is never imported
+    options = ["--quiet", "--disable-pip-version-check", "--no-compile"]
+    done = subprocess.call([*pip_command(), "install", *options, "--editable", HERE + extra])
     if done != 0:
         fail("the installation failed; see above. A connection to a package index is needed the first time.")
     with open(STAMP, "w") as file:
@@ -134,24 +135,39 @@ def foam(arguments):
 
 
 def test(arguments):
+    """Types and layers are looked at beside the tests, some of which wait and leave a core idle."""
     install("[dev]")
-    checks = [
-        ("ruff", [tool("ruff"), "check", "."]),
-        ("mypy", [tool("mypy"), "--strict", "src"]),
-        ("layers", [tool("lint-imports")]),
-        # a worker for each core, each with one thread for linear algebra; "-n 0" runs all in one process.
-        # In their own order: by default files of few tests, some of which are long, would come last.
-        ("pytest", [PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *ORDER, *arguments]),
-    ]
+    # a worker for each core, each with one thread for linear algebra; "-n 0" runs all in one process.
+    # In their own order: by default files of few tests, some of which are long, would come last.
+    pytest = [PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *ORDER, *arguments]
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    slow = [("layers", [tool("lint-imports")]), ("mypy", [tool("mypy"), "--strict", "src"])]
+    beside = [(name, *in_background(command)) for name, command in slow]
     failed = []
-    for name, command in checks:
+    for name, command in (("ruff", [tool("ruff"), "check", "."]), ("pytest", pytest)):
         say("--- " + name)
         if subprocess.call(command, cwd=HERE) != 0:
             failed.append(name)
+    for name, process, output in beside:
+        say("--- " + name)
+        if process.wait() != 0:
+            failed.append(name)
+        with open(output, encoding="utf-8", errors="replace") as file:
+            sys.stdout.write(file.read())
+        sys.stdout.flush()
+        os.remove(output)
     say("failed: " + ", ".join(failed) if failed else "all checks passed")
     return 1 if failed else 0
+
+
+def in_background(command):
+    """A process that takes the time that others leave, and the path of what it prints."""
+    handle, output = tempfile.mkstemp()
+    options = {} if os.name == "nt" else {"preexec_fn": lambda: os.nice(5)}
+    process = subprocess.Popen(command, cwd=HERE, stdout=handle, stderr=subprocess.STDOUT, **options)
+    os.close(handle)
+    return process, output
 
 
 def docs(arguments):

@@ -189,18 +189,19 @@ class Browser:
 
     def mouse(self, *path: tuple[float, float], button: str = "left", modifiers: int = 0) -> None:
         """Press at the first place, move along the others, let go at the last."""
-        buttons = {"left": 1, "right": 2, "middle": 4}[button]
-
-        def event(kind: str, place: tuple[float, float], **more: Any) -> None:
-            x, y = place
-            common = {"button": button, "clickCount": 1, "modifiers": modifiers}
-            self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, **common, **more)
-
-        event("mousePressed", path[0], buttons=buttons)
-        for place in path[1:]:
-            event("mouseMoved", place, buttons=buttons)
-        event("mouseReleased", path[-1], buttons=0)
+        kinds = ["mousePressed", *["mouseMoved"] * (len(path) - 1), "mouseReleased"]
+        for kind, place in zip(kinds, (*path, path[-1]), strict=True):
+            self.mouse_event(kind, place, button=button, modifiers=modifiers)
         self.settle()
+
+    def mouse_event(
+        self, kind: str, place: tuple[float, float], *, button: str = "left", modifiers: int = 0
+    ) -> None:
+        """One of mousePressed, mouseMoved (with the button down) and mouseReleased."""
+        x, y = place
+        down = 0 if kind == "mouseReleased" else {"left": 1, "right": 2, "middle": 4}[button]
+        common = {"button": button, "buttons": down, "clickCount": 1, "modifiers": modifiers}
+        self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, **common)
 
     def wheel(self, place: tuple[float, float], amount: float) -> None:
         """Turn the wheel at a place; above 0 towards the reader."""
@@ -223,6 +224,10 @@ class Browser:
         self._send("Input.dispatchKeyEvent", **down, **common)
         self._send("Input.dispatchKeyEvent", type="keyUp", **common)
         self.settle()
+
+    def paper(self) -> bytes:
+        """The page as it is printed: a PDF."""
+        return base64.b64decode(self._send("Page.printToPDF", printBackground=False)["data"])
 
     def screenshot(self, path: Path | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
         """Pixels (height, width, 3) of the window; also written to ``path``."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from warpedfoam import Torus
+from warpedfoam import MeshSurface, Torus
 from warpedfoam.cli.app import app
 from warpedfoam.io import write_mesh
 from warpedfoam.surfaces import TriangleMesh, mesh_report, read_mesh
@@ -94,6 +95,50 @@ def test_check_never_overwrites(tmp_path):
         assert result.exit_code == 2
         assert "choose another name" in result.stderr
         assert (target.read_bytes() if target.exists() else None) == before
+
+
+def test_check_closes_larger_holes_when_told(tmp_path):
+    path = put(tmp_path / "cut.ply", TriangleMesh(*used(NODES, TRIANGLES[~(TRIANGLES == 40).any(axis=1)])))
+    result = check(path, "-n", 50)
+    assert "small rim for 50 bubbles" in result.output
+    assert "--close-holes" in result.output
+    result = check(path, "--close-holes", 8)
+    assert result.exit_code == 2
+    assert "add --repair" in result.stderr
+    result = check(path, "--repair", tmp_path / "new.ply", "--close-holes", 3)
+    assert result.exit_code == 2
+    assert "--close-holes must" in result.stderr
+    facts = json.loads(check(path, "--repair", tmp_path / "new.ply", "--close-holes", 8, "--json").output)
+    assert facts["repair"]["done"] == ["closed 1 hole"]
+    assert facts["repair"]["rims"] == 0
+
+
+def test_a_foam_on_a_mesh_with_a_small_hole_says_so_first(tmp_path, monkeypatch):
+    path = put(tmp_path / "cut.ply", TriangleMesh(*used(NODES, TRIANGLES[~(TRIANGLES == 40).any(axis=1)])))
+
+    surface = MeshSurface.from_file(path)
+
+    def reached(*_):
+        raise ValueError("far enough")
+
+    monkeypatch.setattr("warpedfoam.cli.job.run_job", reached)
+    job = ["foam", str(path), "-n", "60", "--gap", "0.01", "-o", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, job)
+    assert f"too small for bubbles {(surface.area / 60) ** 0.5:.3g} wide" in result.stderr
+    assert f"warpedfoam check {path} --repair" in result.stderr
+    assert "too small" not in CliRunner().invoke(app, [*job, "--quiet"]).stderr
+    # a rim with room for bubbles is meant
+    away = NODES[TRIANGLES].mean(axis=1)[:, 2] < 0.7
+    job[1] = str(put(tmp_path / "bowl.ply", TriangleMesh(*used(NODES, TRIANGLES[away]))))
+    result = CliRunner().invoke(app, job)
+    assert "far enough" in result.stderr
+    assert "too small" not in result.stderr
+
+
+def used(nodes, triangles):
+    """Without nodes that no triangle has."""
+    kept, inverse = np.unique(triangles, return_inverse=True)
+    return nodes[kept], inverse.reshape(-1, 3)
 
 
 def test_check_writes_nothing_that_is_still_unsound(tmp_path):

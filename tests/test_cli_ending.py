@@ -23,7 +23,7 @@ if __name__ == "__main__":
     sys.exit(main())
 """
 STUCK = "import time; print('IMPORTING', flush=True); time.sleep(60.0)"
-#: The first package that warpedfoam imports, and the one that only the command line does.
+#: The first package that warpedfoam's machinery imports, and the one that only the command line does.
 SLOW = ["numpy", "typer"]
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals and pipes")
 
@@ -75,7 +75,7 @@ def test_interrupted_while_importing_is_130_and_one_line(start: str, package: st
 
 @posix
 def test_other_programs_keep_their_ctrl_c(tmp_path: Path) -> None:
-    code = "try:\n    import warpedfoam\nexcept KeyboardInterrupt:\n    raise SystemExit(42)"
+    code = "try:\n    import warpedfoam.cell\nexcept KeyboardInterrupt:\n    raise SystemExit(42)"
     assert interrupted([sys.executable, "-c", code], slow_import(tmp_path, "numpy")) == (42, "")
 
 

@@ -16,6 +16,8 @@ from warpedfoam.cli.app import app
 from warpedfoam.plot import figure_cylinder, figure_second_order
 from warpedfoam.studies.paper_films import cylinder_films, scaled_films, torus_films
 
+from .test_paper_figures import check_readable
+
 ROOT = Path(__file__).parents[1]
 TUBE = wf.Cylinder(6.0, 20.0)
 
@@ -45,6 +47,24 @@ def test_figures_with_films_from_the_table(tmp_path: Path) -> None:
     assert next(r for r in films if r["volume"] == 0.5)["ratio"] == pytest.approx(0.999517699, abs=1e-9)
 
 
+def test_figures_for_a_column(tmp_path: Path) -> None:
+    told = call("figures", "paper", "-o", tmp_path, "--only", "gap", "--width", "86", "--json")
+    assert json.loads(told)["width_mm"] == 86.0
+    with open(tmp_path / "gap.png", "rb") as stream:
+        head = stream.read(24)
+    # 160 dots an inch
+    assert int.from_bytes(head[16:20], "big") == pytest.approx(86.0 / 25.4 * 160, abs=1)
+
+
+def test_new_figures_can_be_read_on_a_column() -> None:
+    films = cylinder_films(0.5, [0.5], [3.0, 6.0])
+    drawn = figure_cylinder(0.5, (0.5,), radii=(3.0, 6.0), films=films, around=films, width=86.0)
+    check_readable(drawn.figure, 86.0)
+    scaled = scaled_films(0.5, 0.5, scales=(1.0, 2.0))
+    along = {name: torus_films(0.5, [0.5], [0.0, 180.0], layers=n) for name, n in (("free", 3), ("ruled", 1))}
+    check_readable(figure_second_order(films=scaled, along=along, width=86.0).figure, 86.0)
+
+
 def test_films_are_those_of_the_table() -> None:
     kept = [r for r in rows(ROOT / "data" / "torus_potential.csv") if r["V"] == 0.5]
     fresh = torus_films(0.5, [0.5], [kept[0]["phi_degrees"], kept[-1]["phi_degrees"]])
@@ -56,6 +76,7 @@ def test_films_are_those_of_the_table() -> None:
 @pytest.mark.parametrize(
     ("args", "says"),
     [
+        (["paper", "--width", "20"], "width must be at least 40"),
         (["nature"], "no figures 'nature'"),
         (["paper", "--only", "moon"], "no figure 'moon'"),
         (["paper", "--layers", "1"], "--layers must be from 2 to 12"),

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import warpedfoam as wf
+from warpedfoam.sizes import SIZES
 from warpedfoam.studies.observables import COORDINATES, GROUPS, SINGLE
-from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import Layer
 
 ROOT = Path(__file__).parents[1]

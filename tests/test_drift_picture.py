@@ -13,6 +13,7 @@ from PIL import Image
 import warpedfoam as wf
 
 from .test_motion import PAPER, one_bubble, sphere_grains
+from .test_paper_figures import check_readable
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +35,17 @@ def test_the_picture_shows_frames_and_energy(moved: wf.Drift, tmp_path: Path) ->
     # all frames show the same place
     assert len({axes.get_xlim() for axes in pictures}) == 1
     assert wf.save_figure(tmp_path / "drift.png", figure).stat().st_size > 10_000
+
+
+def test_a_drift_on_a_column(moved: wf.Drift) -> None:
+    figure = wf.plot_drift(moved, width=86.0, title="down")
+    check_readable(figure, 86.0)
+    boxes = [axes.get_window_extent() for axes in figure.axes[:4]]
+    # two by two
+    assert len({round(0.5 * (box.x0 + box.x1)) for box in boxes}) == 2
+    assert len({round(0.5 * (box.y0 + box.y1)) for box in boxes}) == 2
+    with pytest.raises(ValueError, match="size must be at least 1 inch"):
+        wf.plot_drift(moved, size=(0.1, 3.0))
 
 
 def test_the_view_sees_every_bubble(moved: wf.Drift) -> None:

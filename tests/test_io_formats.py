@@ -195,7 +195,7 @@ def test_graphs(tmp_path: Path, foam: wf.Foam, graph: str) -> None:
         wf.write_graphml(tmp_path / "net.graphml", foam, graph=graph), force_multigraph=True
     )
     told = json.loads(wf.write_graph_json(tmp_path / "net.json", foam, graph=graph).read_text())
-    back = nx.node_link_graph(told, edges="edges", name="node")
+    back = nx.node_link_graph(told, edges="edges")
     table = pd.DataFrame(told["edges"]).sort_values("film")
     np.testing.assert_array_equal(table["length"], foam.film_lengths)
     for one in (read, back):

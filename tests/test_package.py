@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+
+import warpedfoam
 
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -29,12 +32,56 @@ def modules_after(statement: str) -> set[str]:
 
 
 def test_import_is_light() -> None:
-    assert HEAVY & modules_after("import warpedfoam") == set()
+    # with every name of the package, and the machinery that it stands for
+    assert HEAVY & modules_after("from warpedfoam import *; import warpedfoam.studies.options") == set()
+
+
+def test_import_alone_waits_for_what_is_asked_for() -> None:
+    loaded = modules_after("import warpedfoam")
+    assert {"numpy", "scipy", "numba", "h5py", *HEAVY} & loaded == set()
+    assert "scipy" not in modules_after("import warpedfoam as wf; wf.MeshError, wf.theory.bubbles")
+    assert {"warpedfoam.plot", "warpedfoam.studies"} & modules_after(
+        "import warpedfoam as wf; wf.relax"
+    ) == set()
+
+
+def test_names_are_where_type_checkers_find_them() -> None:
+    """The imports that only type checkers read, the table that is read instead, and `__all__`."""
+    source = Path(warpedfoam.__file__).read_text(encoding="utf-8")
+    (block,) = [
+        n for n in ast.parse(source).body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"
+    ]
+    checked = {}
+    for node in block.body:
+        assert isinstance(node, ast.ImportFrom)
+        checked.update({alias.name: node.module for alias in node.names})
+    assert sorted(checked) == warpedfoam.__all__
+    for name, module in checked.items():
+        home = importlib.import_module(str(module))
+        wanted = importlib.import_module(f"{module}.{name}") if name == "theory" else getattr(home, name)
+        assert getattr(warpedfoam, name) is wanted, name
+    assert set(warpedfoam._HOME_OF) | {"theory"} == set(checked)
+    with pytest.raises(AttributeError, match="module 'warpedfoam' has no attribute 'foams'"):
+        warpedfoam.foams  # type: ignore[attr-defined]  # noqa: B018
+    assert set(warpedfoam.__all__) <= set(dir(warpedfoam))
+
+
+@pytest.mark.parametrize(
+    "first",
+    ["import warpedfoam.relax.driver", "import warpedfoam.studies", "from warpedfoam import relax", "pass"],
+)
+def test_relax_is_the_function_whatever_is_imported_first(first: str) -> None:
+    code = (
+        f"{first}\nimport warpedfoam as wf, importlib\nassert callable(wf.relax), wf.relax\n"
+        "import warpedfoam.relax.kkt\nfrom warpedfoam.relax.driver import relax as same\n"
+        "assert wf.relax is same\nassert importlib.import_module('warpedfoam.relax').relax is same"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_command_answers_without_loading_the_machinery() -> None:
     loaded = modules_after("import warpedfoam.cli.app")
-    assert {"matplotlib", "trimesh", "igl", "networkx"} & loaded == set()
+    assert {"numpy", "scipy", "matplotlib", "trimesh", "igl", "networkx"} & loaded == set()
 
 
 def test_every_module_has_its_layer() -> None:

@@ -45,6 +45,62 @@ def test_every_figure_is_written_with_its_table(name, tmp_path):
     assert len(rows) == sizes.pop() + 1
 
 
+def overlaps(one, two):
+    return one.x0 < two.x1 and two.x0 < one.x1 and one.y0 < two.y1 and two.y0 < one.y1
+
+
+def check_readable(figure, width):
+    """As wide as asked for; letters of 6 points or more, on the figure, and none upon another panel's."""
+    figure.draw_without_rendering()
+    wide, tall = figure.get_size_inches()
+    assert wide == pytest.approx(width / 25.4)
+    texts = [t for t in figure.findobj(match=lambda a: hasattr(a, "get_fontsize")) if t.get_text()]
+    shown = [t for t in texts if t.get_visible()]
+    assert min(t.get_fontsize() for t in shown) >= 6.0
+    box = figure.get_tightbbox()
+    assert min(box.x0, box.y0) > -0.03
+    assert max(box.x1 - wide, box.y1 - tall) < 0.03
+    for axes in figure.axes:
+        names = [axes.xaxis.label, axes.yaxis.label, *(axes.get_legend() or Nothing).get_texts()]
+        boxes = [name.get_window_extent() for name in names if name.get_text()]
+        for other in figure.axes:
+            frame = other.get_window_extent()
+            if other is not axes and other not in axes.child_axes and axes not in other.child_axes:
+                assert not any(overlaps(box, frame) for box in boxes), (axes, other)
+
+
+class Nothing:
+    get_texts = staticmethod(list)
+
+
+@pytest.mark.parametrize("width", [86.0, 180.0])
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_can_be_read_at_the_width_of_a_column(name, width):
+    drawn, usual = FIGURES[name](width=width), FIGURES[name]()
+    check_readable(drawn.figure, width)
+    for column, values in usual.table.items():
+        np.testing.assert_array_equal(drawn.table[column], values)
+    if width < 130.0:
+        # panels stand below each other, none in another
+        boxes = [axes.get_window_extent() for axes in drawn.figure.axes]
+        assert not any(overlaps(one, two) for k, one in enumerate(boxes) for two in boxes[:k])
+        assert len({round(box.x0) for box in boxes[: 3 if name == "curvature" else 1]}) == 1
+        assert not any(axes.child_axes for axes in drawn.figure.axes)
+
+
+@pytest.mark.parametrize("width", [39.0, 1001.0, float("nan")])
+def test_widths_out_of_range_are_refused(width):
+    with pytest.raises(ValueError, match="width"):
+        figure_gap(width=width)
+
+
+def test_text_of_figures_stays_text(tmp_path):
+    path = figure_gap(width=86.0).save(tmp_path / "gap.svg")
+    text = path.read_text(encoding="utf-8")
+    assert "balancing δd" in text
+    assert "<text" in text
+
+
 def drawn_lines(axes):
     return [np.asarray(line.get_xydata()) for line in axes.get_lines() if len(line.get_xdata()) > 50]
 

@@ -16,7 +16,8 @@ import warpedfoam as wf
 from warpedfoam.cli.app import app
 from warpedfoam.io.colours import COLOR_CHOICES, bubble_colours
 from warpedfoam.io.patches import bubble_patches
-from warpedfoam.plot import foam_picture, projection
+from warpedfoam.plot import painting, projection
+from warpedfoam.view.chunks import in_chunks, parts_of_bubbles
 from warpedfoam.view.document import SCRIPTS
 from warpedfoam.view.frames import packed, unpacked
 from warpedfoam.view.geometry import OWN_IMAGE, WALL, detail, geometry
@@ -86,7 +87,10 @@ def test_triangles_cover_the_surface_once(tmp_path, foam):
     """At every degree of detail the areas of the bubbles' triangles are those of the bubbles."""
     facts, (arrays,) = read_page(wf.write_view(tmp_path / "v.html", foam))
     known = foam.network.bubble_euler == 1
-    assert facts["frames"][0]["meshes"] == (2 if foam.n_bubbles > 300 else 1)
+    pieces, rings = detail(foam.n_bubbles)
+    busy = foam.n_bubbles > 300 or 2 * foam.network.n_films * pieces * (2 * rings - 1) > 30_000
+    assert facts["frames"][0]["meshes"] == (2 if busy else 1)
+    assert facts["frames"][0]["pieces"] == [pieces, 2 if foam.n_bubbles > 300 else 4][: 1 + busy]
     for k in range(facts["frames"][0]["meshes"]):
         points, triangles = arrays[f"mesh{k}:points"], arrays[f"mesh{k}:triangles"]
         owner = arrays[f"mesh{k}:owner"]
@@ -216,6 +220,52 @@ def test_packing_is_undone():
         np.testing.assert_array_equal(array, arrays[name].ravel())
 
 
+@pytest.mark.parametrize("foam", [sphere_foam(120), torus_foam(), bubble_on_torus(), rimmed(), repeating()])
+def test_parts_hold_what_is_drawn(foam):
+    """Each triangle and line piece in one part, inside its ball and its cone; the rest stays as it was."""
+    normals = foam.cell.surface.normals(foam.bubble_centres)
+    disks = foam.network.bubble_euler == 1
+    part = parts_of_bubbles(foam.bubble_centres, normals, disks)
+    assert (np.bincount(part) > 0).all()
+    assert np.bincount(part[disks]).max() < 24
+    assert set(part[~disks]).isdisjoint(part[disks])
+    plain = geometry(foam, 6, 3)
+    mesh, chunks = in_chunks(plain, part)
+    order = np.lexsort(plain.triangles.T)
+    np.testing.assert_array_equal(mesh.triangles[np.lexsort(mesh.triangles.T)], plain.triangles[order])
+    pairs = [np.hstack([m.segments, m.beside]) for m in (plain, mesh)]
+    np.testing.assert_array_equal(*(rows[np.lexsort(rows.T)] for rows in pairs))
+    of_triangle = np.repeat(np.arange(part.max() + 1), np.diff(chunks.triangles))
+    of_segment = np.repeat(np.arange(part.max() + 1), np.diff(chunks.segments))
+    np.testing.assert_array_equal(of_triangle, part[mesh.owner[mesh.triangles[:, 0]]])
+    np.testing.assert_array_equal(of_segment, part[mesh.beside[:, 0]])
+    below = mesh.points - mesh.sunk[:, None] * mesh.normals
+    for points, places, of in (
+        (mesh.points, mesh.triangles, of_triangle),
+        (below, mesh.triangles, of_triangle),
+        (mesh.line_points, mesh.segments, of_segment),
+    ):
+        apart = np.linalg.norm(points[places] - chunks.balls[of, None, :3], axis=2)
+        assert (apart <= chunks.balls[of, None, 3]).all()
+    for normals, places, of in (
+        (mesh.normals, mesh.triangles, of_triangle),
+        (mesh.line_normals, mesh.segments, of_segment),
+    ):
+        assert (
+            np.einsum("tki,ti->tk", normals[places], chunks.cones[of, :3]) >= chunks.cones[of, None, 3]
+        ).all()
+
+
+def test_many_bubbles_have_small_parts():
+    """Two thousand bubbles: parts of a dozen or two, whose normals are within 15 degrees."""
+    foam = sphere_foam(2000, even=True)
+    normals = foam.cell.surface.normals(foam.bubble_centres)
+    part = parts_of_bubbles(foam.bubble_centres, normals, np.ones(2000, dtype=bool))
+    _, chunks = in_chunks(geometry(foam, 2, 1), part)
+    assert len(chunks.balls) == 128
+    assert np.degrees(np.arccos(chunks.cones[:, 3])).max() < 20.0
+
+
 # ------------------------------------------------------------------ colours
 
 
@@ -233,7 +283,7 @@ def test_shading_is_that_of_the_pictures():
     """The shader repeats numbers of `plot`, which it cannot import."""
     text = (PAGE / "shaders.js").read_text(encoding="utf-8")
     painter = (PAGE / "painter.js").read_text(encoding="utf-8")
-    assert f"mix(vec3({foam_picture.BACK_GREY}), colour, {foam_picture.BACK_SHARE})" in text
+    assert f"mix(vec3({painting.BACK_GREY}), colour, {painting.BACK_SHARE})" in text
     assert f"{projection._AMBIENT} + {1 - projection._AMBIENT:.2f} * clamp" in text
     assert f"unit({projection._LIGHT.tolist()})" in painter
 
@@ -302,6 +352,7 @@ def test_detail_falls_with_bubbles_and_frames():
         ({"foams": [lone_bubble(), None]}, TypeError, r"foams\[1\] must be a Foam"),
         ({"color_by": "taste"}, ValueError, "color_by"),
         ({"color_by": "pressure"}, ValueError, "relax them first"),
+        ({"color_by": "gap"}, ValueError, "not parallel"),
         ({"title": 5}, TypeError, "title must be a string"),
         ({"labels": ["a", "b"]}, ValueError, "1 foams, 2 labels"),
         ({"labels": "a"}, TypeError, "labels must be a sequence"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import warpedfoam as wf
 from .io_foams import sphere_foam, torus_foam, with_pressures
 from .test_view import PAGE, read_page
 
+WHOLE, PIXEL = (-1.0, 1.0, -1.0, 1.0), (0.1, 0.12, -0.3, -0.28)
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
 
@@ -128,6 +130,60 @@ def test_points_land_where_a_pinhole_puts_them():
     # nearer is smaller
     assert (np.diff(device[np.argsort(depth), 2]) > 0).all()
     assert pixel == pytest.approx(distance / focal)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_only_what_is_out_of_sight_is_left_out(tmp_path, closed):
+    """Balls on a sphere, by brute force: what is left out faces away or is beside the window."""
+    rng = np.random.default_rng(3)
+    n = 3000
+    axes = rng.standard_normal((n, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    radii, angles = rng.uniform(0.02, 0.3, n), rng.uniform(0.02, 0.5, n)
+    balls = np.column_stack([2.0 * axes, radii])
+    cones = np.column_stack([axes, np.cos(angles)])
+    views = [
+        ((25.0, -60.0), 1.2, WHOLE),
+        ((70.0, 10.0), 4.0, WHOLE),
+        ((-10.0, 100.0), 1.3, PIXEL),
+    ]
+    width, height = 500, 800
+    for view, zoom, share in views:
+        code = f"""
+        const camera = {camera(view=view, zoom=zoom)};
+        const parts = {{ balls: {balls.ravel().tolist()}, cones: {cones.ravel().tolist()} }};
+        tell(partsInSight(camera, {width}, {height}, parts, {json.dumps(closed)}, {list(share)}));
+        tell(lens(camera, {width}, {height}));
+        """
+        runs, lens = run(code, "maths.js")
+        assert all(a < b for a, b in runs)
+        assert all(one[1] < two[0] for one, two in pairwise(runs))
+        drawn = np.zeros(n, dtype=bool)
+        for first, last in runs:
+            drawn[first:last] = True
+        # points on each ball, each with a normal in its cone
+        m = 200
+        inside = rng.standard_normal((m, 3))
+        inside /= np.linalg.norm(inside, axis=1, keepdims=True)
+        points = balls[:, None, :3] + radii[:, None, None] * inside
+        aside = rng.standard_normal((n, m, 3))
+        aside -= np.einsum("nmi,ni->nm", aside, axes)[..., None] * axes[:, None]
+        aside /= np.linalg.norm(aside, axis=2, keepdims=True)
+        tilt = angles[:, None, None] * rng.uniform(0, 1, (n, m, 1)) ** 0.2
+        normals = np.cos(tilt) * axes[:, None] + np.sin(tilt) * aside
+        e, a = np.radians(view)
+        towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        arm = points - np.array(lens["eye"])
+        depth = -(arm @ towards)
+        x = arm @ right / (lens["across"] * depth)
+        y = arm @ np.cross(towards, right) / (lens["upright"] * depth)
+        seen = (share[0] < x) & (x < share[1]) & (share[2] < y) & (y < share[3])
+        if closed:
+            seen &= np.einsum("nmi,nmi->nm", normals, arm) < 0.0
+        assert not (seen.any(axis=1) & ~drawn).any()
+        # and little is drawn in vain
+        assert drawn.sum() <= 1.35 * seen.any(axis=1).sum() + 6
 
 
 def test_a_drag_takes_the_near_side_along():

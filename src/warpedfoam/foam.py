@@ -413,10 +413,10 @@ class Foam:
         return replace(self, film_offsets=self.film_offsets @ values.T)
 
     def to_networkx(self) -> nx.MultiGraph:
-        """Dual multigraph with the bubbles' scalars (id, area, volume, pressure, position) on the nodes."""
+        """Dual multigraph; nodes carry their bubble's id (``bubble``), area, volume, pressure, position."""
         graph = self.network.to_networkx()
         columns = {
-            "id": self.bubble_ids.tolist(),
+            "bubble": self.bubble_ids.tolist(),
             "area": self.bubble_areas.tolist(),
             "volume": self.bubble_volumes.tolist(),
             **{axis: self.bubble_centres[:, k].tolist() for k, axis in enumerate("xyz")},

@@ -132,7 +132,7 @@ def _add_command(
     shared: Mapping[str, tuple[Any, Any]],
     do: Callable[[dict[str, Any], Mapping[str, Any]], None],
 ) -> None:
-    from warpedfoam.studies.sizes import SIZES
+    from warpedfoam.sizes import SIZES
 
     sizes = SIZES[kind]
     plain = inspect.Parameter.KEYWORD_ONLY
@@ -284,6 +284,8 @@ def _run(options: Callable[[], Any], *, as_json: bool, quiet: bool, debug: bool)
         from warpedfoam.cli.job import run_job
 
         chosen = options()
+        if not quiet:
+            _warn_of_small_rims(chosen)
         with progress_bars(quiet=quiet) as report:
             job = run_job(chosen, report)
         if as_json:
@@ -293,6 +295,21 @@ def _run(options: Callable[[], Any], *, as_json: bool, quiet: bool, debug: bool)
     if not job.relaxation.converged:
         say(f"did not converge: {job.relaxation.message}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)
+
+
+def _warn_of_small_rims(options: Any) -> None:
+    """Before a long run that will hardly converge, say so: holes that are damage look like rims."""
+    from warpedfoam.surfaces import MeshSurface
+    from warpedfoam.surfaces.health import small_rims
+
+    surface, count = options.plates.surface, options.n_bubbles
+    if isinstance(surface, MeshSurface) and count is not None and (small := small_rims(surface.mesh, count)):
+        node, around = small[0]
+        say(
+            f"note: the mesh has a hole at node {node}, {around:.3g} round, too small for bubbles "
+            f"{(surface.area / count) ** 0.5:.3g} wide to end on: the foam may not converge. If damage: "
+            f"warpedfoam check {options.surface.sizes['file']} --repair mended.ply --close-holes 20"
+        )
 
 
 def summary_text(record: Mapping[str, Any]) -> str:

@@ -7,14 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from warpedfoam.arrays import as_integer
 from warpedfoam.errors import MeshError
 from warpedfoam.io import write_mesh
 from warpedfoam.io.atomic import writable_path
 from warpedfoam.surfaces import MeshReport, mesh_report, read_mesh, repaired
+from warpedfoam.surfaces.health import SAFE_EDGES
+from warpedfoam.surfaces.holes import MOST_EDGES
 
 
 def check_file(
-    file: str, *, gap: float | None, n_bubbles: int | None, repair: str | None
+    file: str, *, gap: float | None, n_bubbles: int | None, repair: str | None, close_holes: int | None = None
 ) -> tuple[bool, str, dict[str, Any]]:
     """Whether the mesh (as repaired, if asked for) is sound, a text for a reader, and the facts.
 
@@ -25,12 +28,19 @@ def check_file(
         See `warpedfoam.surfaces.mesh_report`.
     repair : str, optional
         Where to write the repaired mesh, a new file; it is written only if it is sound.
+    close_holes : int, optional
+        Holes of up to so many edges are closed too.
 
     Raises
     ------
     ValueError, OSError
         If the mesh cannot be read, or ``repair`` is no name for a new file.
     """
+    if close_holes is not None and repair is None:
+        raise ValueError("--close-holes says what --repair closes; add --repair FILE.ply")
+    edges = SAFE_EDGES
+    if close_holes is not None:
+        edges = as_integer(close_holes, "--close-holes", minimum=SAFE_EDGES, maximum=MOST_EDGES)
     target = None if repair is None else _new_file(repair)
     mesh = read_mesh(file)
     report = mesh_report(mesh, gap=gap, n_bubbles=n_bubbles)
@@ -39,7 +49,7 @@ def check_file(
     if target is None and report.sound:
         return True, "\n".join(lines), facts
     try:
-        mended, done = repaired(mesh)
+        mended, done = repaired(mesh, hole_edges=edges)
     except MeshError as fault:
         lines.append(f"repair    not possible: {fault}")
         facts["repair"] = {"done": [], "sound": False, "file": None, "message": str(fault)}

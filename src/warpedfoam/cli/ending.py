@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from types import FrameType
 
 import typer
@@ -36,6 +37,8 @@ def ending_well(debug: bool) -> Iterator[None]:
     from warpedfoam.errors import ConvergenceError
 
     try:
+        # all that is slow to import, while Ctrl-C still ends the process at once
+        import_module("warpedfoam.studies")
         raise_on_interrupt()
         yield
     except KeyboardInterrupt:

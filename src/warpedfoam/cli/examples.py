@@ -47,6 +47,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "check": (
         "warpedfoam check data/double_torus.ply --gap 0.3 -n 300",
         "warpedfoam check scan.stl --repair mended.ply",
+        "warpedfoam check scan.stl --repair mended.ply --close-holes 20",
     ),
     "defects": ("warpedfoam defects out/foam.npz", "warpedfoam defects out/foam.npz --json --no-picture"),
     "convert": (

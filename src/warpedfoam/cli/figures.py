@@ -17,6 +17,7 @@ from warpedfoam.cli.progress import Progress, silent
 from warpedfoam.io import versions, write_record
 from warpedfoam.io.atomic import writable_path
 from warpedfoam.io.tables import write_columns_csv
+from warpedfoam.plot.style import Style
 
 if TYPE_CHECKING:
     from warpedfoam.plot import Charted
@@ -36,6 +37,7 @@ def draw_paper(
     only: list[str] | None = None,
     torus_table: str | None = None,
     layers: int = 4,
+    width: float | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Draw the figures into the folder ``out``: NAME.png, NAME.csv, tables of the films, a record.
@@ -49,6 +51,9 @@ def draw_paper(
         Take the films on the torus from this table (``data/torus_potential.csv``) instead of computing them.
     layers : int, optional
         Layers of the films on spheres, tori and cylinders; the errors of theory are found with six.
+
+    width : float, optional
+        Millimetres at which the figures are to be printed: 86 for one column.
 
     Returns
     -------
@@ -68,6 +73,7 @@ def draw_paper(
             raise ValueError(f"there is no figure {name!r}; figures are {', '.join(NAMES)}")
     if not 2 <= layers <= 12:
         raise ValueError(f"--layers must be from 2 to 12, got {layers}")
+    Style.of(width)  # refuse before films are computed
     given = None if torus_table is None else _read_torus(torus_table)
     folder = output_folder(out)
     record = writable_path(folder / RECORD)
@@ -76,7 +82,7 @@ def draw_paper(
     for name in chosen:
         clock = time.perf_counter()
         progress(name, 0.0)
-        chart, films = _chart(name, layers, given, partial(progress, name))
+        chart, films = _chart(name, layers, given, width, partial(progress, name))
         outputs.append(str(chart.save(folder / f"{name}.png")))
         outputs.append(str(chart.write_csv(folder / f"{name}.csv")))
         if films is not None:
@@ -88,6 +94,7 @@ def draw_paper(
         "gap": GAP,
         "volumes": list(VOLUMES),
         "layers": layers,
+        "width_mm": width,
         "torus_films": f"computed, {layers} layers" if torus_table is None else f"taken from {torus_table}",
         "seconds": seconds,
         "started": started.isoformat(timespec="seconds"),
@@ -108,7 +115,7 @@ def summary_text(facts: dict[str, Any]) -> str:
 
 
 def _chart(
-    name: str, layers: int, given: Columns | None, report: Callable[[float], None]
+    name: str, layers: int, given: Columns | None, width: float | None, report: Callable[[float], None]
 ) -> tuple[Charted, Columns | None]:
     """The figure, and the films in it that its table does not hold."""
     from warpedfoam import plot
@@ -117,18 +124,18 @@ def _chart(
     if name == "spheres":
         films = paper_films.sphere_films(GAP, VOLUMES, RADII, layers=layers, report=report)
         points = (films["sphere_radius"], films["volume"], films["ratio"])
-        return plot.figure_spheres(GAP, VOLUMES, points=points), films
+        return plot.figure_spheres(GAP, VOLUMES, points=points, width=width), films
     if name == "torus":
         films = given or paper_films.torus_films(GAP, VOLUMES, DEGREES, layers=layers, report=report)
         points = (films["phi_degrees"], films["volume"], films["ratio"])
-        return plot.figure_torus_energy(GAP, VOLUMES, points=points), films
+        return plot.figure_torus_energy(GAP, VOLUMES, points=points, width=width), films
     if name == "second_order":
         scaled = paper_films.scaled_films(GAP, 0.5, report=report)
         along = {
             "free": paper_films.torus_films(GAP, [0.5], DEGREES, layers=6),
             "ruled": paper_films.torus_films(GAP, [0.5], DEGREES, layers=1),
         }
-        chart = plot.figure_second_order(GAP, 0.5, films=scaled, along=along)
+        chart = plot.figure_second_order(GAP, 0.5, films=scaled, along=along, width=width)
         both = {
             "phi_degrees": along["free"]["phi_degrees"],
             "free_ratio": along["free"]["ratio"],
@@ -136,14 +143,14 @@ def _chart(
         }
         return chart, both
     if name == "cylinder":
-        return plot.figure_cylinder(GAP), None
-    plain: dict[str, Callable[[], Charted]] = {
+        return plot.figure_cylinder(GAP, width=width), None
+    plain: dict[str, Callable[..., Charted]] = {
         "curvature": plot.figure_curvature,
         "surface": plot.figure_surface,
         "circles": plot.figure_circles,
         "gap": plot.figure_gap,
     }
-    return plain[name](), None
+    return plain[name](width=width), None
 
 
 def _read_torus(file: str) -> Columns:

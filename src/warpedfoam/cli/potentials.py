@@ -15,10 +15,10 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.cli.folders import output_folder
 from warpedfoam.io import versions, write_record
 from warpedfoam.io.atomic import writable_path
+from warpedfoam.sizes import SIZES
 from warpedfoam.studies import GeometricPotential, geometric_potential, write_potential_csv
 from warpedfoam.studies.options import MAKERS
 from warpedfoam.studies.rims import disks_over_rim
-from warpedfoam.studies.sizes import SIZES
 from warpedfoam.surfaces import Surface, Torus
 
 METHODS = ("theory", "ruled", "free")

@@ -29,6 +29,10 @@ def figures(
         typer.Option("--torus-table", help="Take films on the torus from this CSV; computed if left out."),
     ] = None,
     layers: Annotated[int, typer.Option("--layers", help="Layers of the films, 2 to 12.")] = 4,
+    width: Annotated[
+        float | None,
+        typer.Option("--width", help="Width in print, in mm: 86 for one column."),
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -41,7 +45,9 @@ def figures(
         if which != "paper":
             raise ValueError(f"there are no figures {which!r}; say: warpedfoam figures paper")
         with progress_bars(quiet=quiet) as report:
-            facts = draw_paper(out, only=only, torus_table=torus_table, layers=layers, progress=report)
+            facts = draw_paper(
+                out, only=only, torus_table=torus_table, layers=layers, width=width, progress=report
+            )
         if as_json or not quiet:
             print(json.dumps(facts, allow_nan=False) if as_json else told(facts), flush=True)
 
@@ -58,6 +64,10 @@ def check(
     repair: Annotated[
         str | None, typer.Option("--repair", metavar="FILE", help="Write a safely repaired mesh (PLY).")
     ] = None,
+    close_holes: Annotated[
+        int | None,
+        typer.Option("--close-holes", help="Repair closes holes of up to so many edges."),
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -66,7 +76,9 @@ def check(
     with ending_well(debug), signals():
         from warpedfoam.cli.checking import check_file
 
-        sound, text, facts = check_file(file, gap=gap, n_bubbles=n_bubbles, repair=repair)
+        sound, text, facts = check_file(
+            file, gap=gap, n_bubbles=n_bubbles, repair=repair, close_holes=close_holes
+        )
         if as_json or not quiet:
             print(json.dumps(facts, allow_nan=False) if as_json else text, flush=True)
     if not sound:

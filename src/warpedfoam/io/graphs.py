@@ -20,8 +20,9 @@ GRAPHS = ("bubbles", "films")
 def write_graphml(path: PathLike, foam: Foam, *, graph: str = "bubbles") -> Path:
     """Write a multigraph of the foam as GraphML (networkx, Gephi, igraph, Cytoscape).
 
-    ``"bubbles"``: a node per bubble with ``id``, ``sides``, ``charge``, ``area``, ``volume``, ``x``,
-    ``y``, ``z`` (its centre) and ``pressure``; an edge per film with ``film`` and ``length``.
+    ``"bubbles"``: a node per bubble with ``bubble`` (its id), ``sides``, ``charge``, ``area``,
+    ``volume``, ``x``, ``y``, ``z`` (its centre) and ``pressure``; an edge per film with ``film`` and
+    ``length``.
     ``"films"``: a node per vertex with ``degree``, ``x``, ``y``, ``z``; an edge per film with ``film``,
     ``left``, ``right`` (places of the bubbles) and ``length``. Two nodes may share several edges.
 
@@ -58,7 +59,7 @@ def write_graphml(path: PathLike, foam: Foam, *, graph: str = "bubbles") -> Path
 def write_graph_json(path: PathLike, foam: Foam, *, graph: str = "bubbles") -> Path:
     """Write the multigraph of `write_graphml` as node-link JSON (networkx, D3).
 
-    An object with ``nodes`` (``node`` is the place, ``id`` the bubble's id) and ``edges``
+    An object with ``nodes`` (``id`` is the place, ``bubble`` the bubble's id) and ``edges``
     (``source``, ``target``, ``key``: the film).
 
     Parameters
@@ -94,7 +95,7 @@ def write_graph_json(path: PathLike, foam: Foam, *, graph: str = "bubbles") -> P
     import networkx as nx
 
     target = writable_path(path, suffixes=(".json",))
-    told = nx.node_link_data(_graph(foam, graph), edges="edges", name="node", nodes="nodes")
+    told = nx.node_link_data(_graph(foam, graph), edges="edges", nodes="nodes")
     with atomic_text(target) as stream:
         stream.write(json.dumps(told, allow_nan=False) + "\n")
     return target

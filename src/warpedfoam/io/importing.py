@@ -16,7 +16,7 @@ from warpedfoam.errors import FileFormatError, TopologyError
 from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
 from warpedfoam.io.atomic import PathLike, as_path
 from warpedfoam.io.polygon_files import Polygons, obj_polygons, ply_polygons
-from warpedfoam.io.reading import existing
+from warpedfoam.io.reading import brief, existing
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.network import CellNetwork, network_from_loops
@@ -24,6 +24,10 @@ from warpedfoam.surfaces.places import Places
 
 #: Steps of the fit of films to their points, and its smallest change worth another.
 _FIT_STEPS, _FIT_CHANGE = 12, 1e-14
+#: Points to be welded to each, in the mean, beyond which a file is no network.
+_MOST_PAIRS = 64
+#: In sizes of the surface, how far a point may be to be looked at.
+_FAR = 1e9
 
 
 def import_polygons(
@@ -106,7 +110,7 @@ def import_polygons(
     try:
         return _foam(cell, *_read(path), p, allowed, close, exterior)
     except (FileFormatError, TopologyError) as fault:
-        raise type(fault)(f"cannot import {path}: {fault}") from None
+        raise type(fault)(f"cannot import {path}: {brief(fault)}") from None
 
 
 def _read(path: Path) -> Polygons:
@@ -290,6 +294,11 @@ def _one_exterior(network: CellNetwork, place: int, chi: int) -> CellNetwork:
 def _projected(cell: HeleShawCell, points: Floats, used: Ints, allowed: float) -> Floats:
     """Points on the surface; those that no polygon names stay where they are."""
     out = points.copy()
+    # squares of such numbers overflow, and no image of a point is that far away
+    far = np.flatnonzero(np.abs(points[used]).max(axis=1) > _FAR * cell.surface.size)
+    if far.size:
+        k = int(used[far[0]])
+        raise ValueError(f"points must lie on the cell's surface, but point {k} is at {points[k].tolist()}")
     try:
         out[used] = cell.surface.project(points[used])
     except ValueError as fault:
@@ -306,12 +315,20 @@ def _projected(cell: HeleShawCell, points: Floats, used: Ints, allowed: float) -
 
 def _welded(points: Floats, distance: float, period: Floats | None) -> Ints:
     """The first point at the place of each point."""
-    pairs = Places(points, period).pairs(distance)
-    n = len(points)
+    # points at the very same place first: their pairs would be the square of their number
+    _, kept, which = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    places, n = Places(points[kept], period), len(kept)
+    if places.count(distance) > _MOST_PAIRS * n:
+        raise TopologyError(
+            f"the {len(points)} points crowd: over {_MOST_PAIRS} lie within {distance:.3g} of each, in the "
+            "mean; the file is damaged, or weld is too large"
+        )
+    pairs = places.pairs(distance)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, label = connected_components(graph, directed=False)
-    first = np.full(int(label.max()) + 1, n)
-    np.minimum.at(first, label, np.arange(n))
+    label = label[which.reshape(-1)]
+    first = np.full(int(label.max()) + 1, len(points))
+    np.minimum.at(first, label, np.arange(len(points)))
     out: Ints = first[label]
     return out
 

@@ -40,6 +40,18 @@ def text_of(source: Path) -> str:
         raise FileFormatError(f"cannot read {source}: it is no text") from None
 
 
+def brief(fault: object) -> str:
+    r"""What a fault says, in one line that is not too long: it may quote the file.
+
+    Examples
+    --------
+    >>> brief(ValueError("unknown\n" + 500 * "9"))[-12:]
+    '99999999 ...'
+    """
+    text = " ".join(str(fault).split())
+    return text if len(text) <= 240 else f"{text[:236]} ..."
+
+
 def extra(module: str, purpose: str) -> ModuleType:
     """Import a package of the extra ``formats``.
 

@@ -6,13 +6,15 @@ import json
 import math
 import os
 import platform
-from collections.abc import Mapping
+import zlib
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warpedfoam.errors import FileFormatError
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 
 _PACKAGES = ("warpedfoam", "numpy", "scipy", "libigl", "trimesh", "networkx", "matplotlib")
@@ -62,6 +64,49 @@ def write_record(path: PathLike, record: Mapping[str, Any]) -> Path:
     with atomic_text(target) as stream:
         stream.write(text + "\n")
     return target
+
+
+def sealed(record: Mapping[str, Any]) -> dict[str, Any]:
+    """The record and its ``sum``, the CRC-32 of its JSON: a digit that changes on the disk is noticed.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `write_record`.
+
+    Examples
+    --------
+    >>> sealed({"seed": 3})
+    {'seed': 3, 'sum': 552043143}
+    >>> unsealed({"seed": 3, "sum": 552043143}, {"seed"})
+    {'seed': 3}
+    """
+    plain = _plain(record, "record")
+    return {**plain, "sum": _sum(plain)}
+
+
+def unsealed(record: Any, names: Iterable[str]) -> dict[str, Any]:
+    """A record that holds ``names`` and nothing else, without its sum; older ones have none.
+
+    Raises
+    ------
+    FileFormatError
+        If it is another record or its sum is wrong.
+    """
+    if not isinstance(record, dict):
+        raise FileFormatError("it is no record")
+    known = set(names)
+    if record.keys() - {"sum"} != known:
+        wrong = sorted(map(repr, (record.keys() - {"sum"}) ^ known))
+        raise FileFormatError(f"it lacks, or holds beyond what is known: {', '.join(wrong)}")
+    plain = {name: value for name, value in record.items() if name != "sum"}
+    if "sum" in record and record["sum"] != _sum(plain):
+        raise FileFormatError("its checksum is wrong")
+    return plain
+
+
+def _sum(plain: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(plain, ensure_ascii=True, sort_keys=True).encode("ascii"))
 
 
 def versions() -> dict[str, str]:

@@ -19,6 +19,7 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path, atomic_binary, writable_path
+from warpedfoam.io.reading import brief, existing
 from warpedfoam.network import CellNetwork
 
 FORMAT = "warpedfoam foam"
@@ -27,6 +28,9 @@ VERSION = 1
 _INTS = ("next", "origin", "bubble", "bubble_euler", "bubble_ids")
 _FLOATS = ("vertex_points", "film_offsets", "target_volumes")
 _AXES = {"vertex_points": 2, "film_offsets": 2}
+#: What a header must tell, and what it may; a trajectory keeps its notes there.
+_TOLD = {"format", "version", "surface", "gap", "n_heights", "tension", "seed", "pressures"}
+_MAY_TELL = {"exterior", "notes"}
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -149,20 +153,16 @@ def load(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
     (True, True)
     >>> folder.cleanup()
     """
-    source = as_path(path)
-    if not source.exists():
-        raise FileNotFoundError(f"cannot read {source}: there is no such file")
-    if not source.is_file():
-        raise FileFormatError(f"cannot read {source}: it is not a file")
+    source = existing(as_path(path))
     data = source.read_bytes()
     known = known_surfaces(surfaces)
     try:
         return foam_of(_members(data), known)
     except FileFormatError as fault:
-        raise FileFormatError(f"cannot read {source}: {fault}") from None
+        raise FileFormatError(f"cannot read {source}: {brief(fault)}") from None
     except Exception as fault:  # whatever a damaged file makes the parsers raise
         raise FileFormatError(
-            f"cannot read {source}: it is no foam of warpedfoam or it is damaged ({fault})"
+            f"cannot read {source}: it is no foam of warpedfoam or it is damaged ({brief(fault)})"
         ) from fault
 
 
@@ -178,11 +178,16 @@ def _members(data: bytes) -> Arrays:
     if not zipfile.is_zipfile(io.BytesIO(data)):
         raise FileFormatError("it is not an .npz archive, or its end is missing")
     arrays: Arrays = {}
+    left = len(data)  # many members may name the same bytes
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         for member in archive.infolist():
-            if member.compress_type != zipfile.ZIP_STORED or member.file_size > len(data):
+            name = member.filename.removesuffix(".npy")
+            left -= member.file_size
+            if member.compress_type != zipfile.ZIP_STORED or left < 0:
                 raise FileFormatError(f"its member {member.filename!r} is compressed or damaged")
-            arrays[member.filename.removesuffix(".npy")] = _array(archive.read(member), member.filename)
+            if name in arrays:
+                raise FileFormatError(f"it holds {member.filename!r} twice")
+            arrays[name] = _array(archive.read(member), member.filename)
     return arrays
 
 
@@ -218,15 +223,19 @@ def foam_of(arrays: Arrays, known: Mapping[str, type]) -> Foam:
         raise FileFormatError("its header is not that of a foam of warpedfoam")
     if header.get("version") != VERSION:
         raise FileFormatError(
-            f"it is of version {header.get('version')!r}, this warpedfoam reads version {VERSION}; "
+            f"it is of version {header.get('version')!r:.40}, this warpedfoam reads version {VERSION}; "
             "use a newer warpedfoam"
         )
-    wanted = {"surface", "gap", "n_heights", "tension", "seed", "pressures"}
-    lacking = sorted(wanted - header.keys()) + sorted({*_INTS, *_FLOATS} - arrays.keys())
-    if header.get("pressures") is True and "pressures" not in arrays:
-        lacking.append("pressures")
+    wanted = {*_INTS, *_FLOATS, *(["pressures"] if header.get("pressures") is True else [])}
+    lacking = sorted(_TOLD - header.keys()) + sorted(wanted - arrays.keys())
     if lacking:
         raise FileFormatError(f"it lacks {', '.join(lacking)}")
+    known_arrays = {name for name in arrays if name.startswith(("surface.", "gap."))} | {*wanted, "header"}
+    strange = sorted(header.keys() - _TOLD - _MAY_TELL) + sorted(arrays.keys() - known_arrays)
+    if strange:
+        raise FileFormatError(
+            f"it holds what is not known here: {', '.join(map(repr, strange))}; use a newer warpedfoam"
+        )
     for name in (*_INTS, *_FLOATS):
         kinds = "i" if name in _INTS else "f"
         if arrays[name].dtype.kind not in kinds or arrays[name].ndim != _AXES.get(name, 1):
@@ -283,7 +292,8 @@ def _described(value: object, place: str, arrays: Arrays) -> dict[str, Any]:
         elif isinstance(item, tuple) and all(isinstance(x, (int, float)) for x in item):
             fields[field.name] = {"tuple": list(item)}
         else:
-            raise TypeError(f"cannot save {where}: it is a {type(item).__name__}")
+            hint = "; surfaces made by from_formula can be saved" if callable(item) else ""
+            raise TypeError(f"cannot save {where}: it is a {type(item).__name__}{hint}")
     return {"class": type(value).__name__, "fields": fields}
 
 

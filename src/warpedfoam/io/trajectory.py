@@ -8,10 +8,10 @@ import os
 import secrets
 import time
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from warpedfoam.io.hdf5_superblock import (
     released,
     seal,
 )
-from warpedfoam.io.reading import existing, extra
+from warpedfoam.io.reading import brief, existing, extra
 from warpedfoam.io.state import arrays_of, foam_of, known_surfaces
 
 FORMAT = "warpedfoam trajectory"
@@ -45,9 +45,12 @@ LOOKS, PAUSE = 5, 0.05
 #: Pauses of a writer that finds its file being read.
 WAITS = 100
 _PURPOSE = "HDF5"
+#: The oldest HDF5 with a single-writer mode: what a newer one would write, older programs cannot open.
+LIBRARIES = ("v110", "v110")
 _CHUNK = 4096
 
 Arrays = dict[str, NDArray[Any]]
+T = TypeVar("T")
 
 
 class TrajectoryWriter:
@@ -190,7 +193,7 @@ class TrajectoryWriter:
             self._time = float(old.times[-1]) if len(old) else -np.inf
         for look in range(WAITS + 1):
             try:
-                self._file = self._h5py.File(target, "r+", libver="latest")
+                self._file = self._h5py.File(target, "r+", libver=LIBRARIES)
                 break
             except BlockingIOError:
                 # somebody is reading it: not for long
@@ -242,14 +245,15 @@ class Trajectory:
                     time.sleep(PAUSE)
                     continue
                 if isinstance(fault, FileFormatError):
-                    raise FileFormatError(f"cannot read {self.path}: {fault}") from None
+                    raise FileFormatError(f"cannot read {self.path}: {brief(fault)}") from None
                 raise FileFormatError(
-                    f"cannot read {self.path}: it is no trajectory or it is damaged ({fault})"
+                    f"cannot read {self.path}: it is no trajectory or it is damaged ({brief(fault)})"
                 ) from fault
 
     def _read(self, h5py: Any) -> None:
         self._file = _opened(h5py, self.path)
-        self._header, self._surface = _checked(h5py, self._file)
+        self._size = self.path.stat().st_size
+        self._header, self._surface = _checked(h5py, self._file, self._size)
         index = self._file["index"][()]
         if index.ndim != 2 or index.shape[1] != len(_DATA) + 1 or index.dtype != np.int64:
             raise FileFormatError("its index has the wrong shape or type")
@@ -265,22 +269,25 @@ class Trajectory:
         return len(self._sums)
 
     def __getitem__(self, frame: int) -> Foam:
-        k = as_integer(frame, "frame", minimum=-len(self), maximum=len(self) - 1) if len(self) else -1
-        if not len(self):
-            raise IndexError("the trajectory holds no frame")
-        k %= len(self)
-        try:
-            return foam_of(self._arrays(k), self._known)
-        except FileFormatError as fault:
-            raise FileFormatError(f"cannot read frame {k} of {self.path}: {fault}") from None
-        except Exception as fault:
-            raise FileFormatError(f"cannot read frame {k} of {self.path}: it is damaged ({fault})") from fault
+        return self._told(frame, lambda arrays: foam_of(arrays, self._known))
 
     def notes(self, frame: int) -> dict[str, Any]:
         """What was noted with a frame; empty if nothing was."""
-        k = as_integer(frame, "frame", minimum=-len(self), maximum=len(self) - 1)
-        found = json.loads(self._arrays(k % len(self))["header"].tobytes()).get("notes", {})
-        return dict(found)
+        return self._told(frame, lambda arrays: dict(json.loads(arrays["header"].tobytes()).get("notes", {})))
+
+    def _told(self, frame: int, told: Callable[[Arrays], T]) -> T:
+        """What the arrays of a frame tell."""
+        if not len(self):
+            raise IndexError("the trajectory holds no frame")
+        k = as_integer(frame, "frame", minimum=-len(self), maximum=len(self) - 1) % len(self)
+        try:
+            return told(self._arrays(k))
+        except FileFormatError as fault:
+            raise FileFormatError(f"cannot read frame {k} of {self.path}: {brief(fault)}") from None
+        except Exception as fault:
+            raise FileFormatError(
+                f"cannot read frame {k} of {self.path}: it is damaged ({brief(fault)})"
+            ) from fault
 
     def __iter__(self) -> Iterator[Foam]:
         return (self[k] for k in range(len(self)))
@@ -307,7 +314,8 @@ class Trajectory:
         for column, name in enumerate(_DATA):
             start, end = self._ends[k : k + 2, column].tolist()
             data = self._file[name]
-            if end > data.shape[0]:
+            # a file may promise more than it holds
+            if end > data.shape[0] or (end - start) * data.dtype.itemsize > self._size:
                 raise FileFormatError(f"its {name} end too early")
             out[name] = data[start:end]
         told = np.array([self.times[k]])
@@ -323,7 +331,7 @@ class Trajectory:
 
 def _created(h5py: Any, path: Path, cell: tuple[str, Arrays]) -> Any:
     """A new file in single-writer mode, all its datasets there."""
-    file = h5py.File(path, "x", libver="latest", userblock_size=USER_BLOCK)
+    file = h5py.File(path, "x", libver=LIBRARIES, userblock_size=USER_BLOCK)
     try:
         file.attrs["format"] = FORMAT
         file.attrs["version"] = VERSION
@@ -393,28 +401,42 @@ def _opened(h5py: Any, path: Path) -> Any:
     return h5py.File(io.BytesIO(data), "r")
 
 
-def _checked(h5py: Any, file: Any) -> tuple[str, Arrays]:
-    """The cell's header and arrays, if the file is of this format and version."""
+def _checked(h5py: Any, file: Any, size: int) -> tuple[str, Arrays]:
+    """The cell's header and arrays, if the file of ``size`` bytes is of this format and version."""
     if file.attrs.get("format") != FORMAT:
         raise FileFormatError("it is no trajectory of warpedfoam")
     version = file.attrs.get("version")
     if version != VERSION:
         raise FileFormatError(
-            f"it is of version {version}, this warpedfoam reads version {VERSION}; use a newer warpedfoam"
+            f"it is of version {version!s:.40}, this warpedfoam reads version {VERSION}; use a newer one"
         )
-    missing = [name for name in (*_DATA, "time", "index") if not isinstance(file.get(name), h5py.Dataset)]
+    missing = [name for name in (*_DATA, "time", "index") if not _plain(h5py, file, name)]
     if missing:
         raise FileFormatError(f"it lacks {', '.join(missing)}")
+    if strange := sorted(file.keys() - {*_DATA, "time", "index", "cell"}):
+        raise FileFormatError(f"it holds what is not known here: {', '.join(map(repr, strange))}")
     for name in (*_DATA, "time"):
         kind = np.int64 if name in _INTS else np.uint8 if name == "header" else np.float64
         if file[name].ndim != 1 or file[name].dtype != kind:
             raise FileFormatError(f"its {name} have the wrong shape or type")
     header = file.attrs["cell"]
     group = file.get("cell", {})
+    if any(not _plain(h5py, group, name) or group[name].nbytes > size for name in group):
+        raise FileFormatError("the arrays of its cell are damaged")
+    if file["index"].nbytes > size or file["time"].nbytes > size + _CHUNK:
+        raise FileFormatError("its index is longer than the file")
     surface = {name: np.asarray(group[name][()]) for name in group}
     if _checksum(surface, np.frombuffer(header.encode(), dtype=np.uint8)) != file.attrs["cell_checksum"]:
         raise FileFormatError("the checksum of its cell is wrong: it is damaged")
     return header, surface
+
+
+def _plain(h5py: Any, group: Any, name: str) -> bool:
+    """Whether an array lies in the file itself, its bytes as they are: no link, nothing to unpack."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        return False
+    data = group[name]
+    return isinstance(data, h5py.Dataset) and not (data.compression or data.external or data.is_virtual)
 
 
 def _cell_of(arrays: Arrays) -> tuple[str, Arrays]:

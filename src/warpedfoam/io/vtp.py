@@ -22,7 +22,7 @@ from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path, atomic_text, writable_path
 from warpedfoam.io.patches import bubble_patches, film_points, loop_points
-from warpedfoam.io.reading import text_of
+from warpedfoam.io.reading import brief, text_of
 from warpedfoam.io.scalars import bubble_scalars, film_scalars
 from warpedfoam.io.state import arrays_of, foam_of, known_surfaces
 
@@ -155,10 +155,10 @@ def read_vtp(path: PathLike, *, surfaces: Iterable[type] = ()) -> Foam:
     try:
         return foam_of(_state(ET.fromstring(text)), known_surfaces(surfaces))
     except FileFormatError as fault:
-        raise FileFormatError(f"cannot read {source}: {fault}") from None
+        raise FileFormatError(f"cannot read {source}: {brief(fault)}") from None
     except Exception as fault:  # whatever a damaged file makes the parsers raise
         raise FileFormatError(
-            f"cannot read {source}: it is no VTP file or it is damaged ({fault})"
+            f"cannot read {source}: it is no VTP file or it is damaged ({brief(fault)})"
         ) from fault
 
 

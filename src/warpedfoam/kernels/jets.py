@@ -21,9 +21,9 @@ POWERS = tuple((i, total - i) for total in range(5) for i in range(total, -1, -1
 #: Width of the fit's weights in spacings, rounds of fit and tilt, and a hair of stiffness for scarce nodes.
 WIDTH, ROUNDS, STIFFNESS = 2.0, 3, 1e-11
 #: Nodes per pass of the fit, points per pass of the level function.
-FIT_CHUNK, CHUNK = 8192, 1536
-#: Nodes from which on compiling is worth its second or two, if numba is there.
-MANY = 20_000
+FIT_CHUNK, CHUNK = 8192, 1024
+#: Nodes from which on loading compiled code, or compiling it once in two seconds, pays, if numba is there.
+MANY = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,17 @@ class Jets:
     def balls(self) -> Floats:
         """Points and reaches side by side, (n, 4)."""
         return np.ascontiguousarray(self.records[:, :4])
+
+    @cached_property
+    def columns(self) -> Floats:
+        """By number: p, ρ², 1/ρ², e1/h, e2/h, n, coefficients of h q, (29, n + 1); the last ball is empty."""
+        h, square = self.spacing[:, None], self.reach[:, None] ** 2
+        e1, e2, n = (self.frames[:, k] for k in range(3))
+        rows = np.hstack([self.points, square, 1.0 / square, e1 / h, e2 / h, n, h * self.coefficients])
+        out = np.zeros((rows.shape[1], len(rows) + 1))
+        out[:, :-1] = rows.T
+        out[3, -1] = -1.0
+        return out
 
     @cached_property
     def records(self) -> Floats:
@@ -149,81 +160,76 @@ def blended_fast(
 def _blended(
     jets: Jets, points: Floats, nearest: Ints, candidates: Ints, second: bool
 ) -> tuple[Floats, Floats, Floats | None]:
+    """`blended` of few points, by columns: a long array for each number of the pairs of point and ball."""
     near = candidates[nearest]
-    away = points[:, None] - jets.points[near]
-    square = np.einsum("mkx,mkx->mk", away, away)
-    inside = (square < jets.reach[near] ** 2) & (near >= 0)
-    lost = ~inside.any(axis=1)
-    # points that no ball reaches are given their nearest node, and mended below
+    away = [points[:, k, None] - jets.columns[k][near] for k in range(3)]
+    with np.errstate(over="ignore"):
+        square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2]
+    inside = square < jets.columns[3][near]
+    lost = np.flatnonzero(~inside.any(axis=1))
+    # a point that no ball reaches is given weight 1 at a node, so that nothing is 0/0, and its plane below
     inside[lost, 0] = True
-    row, _ = np.nonzero(inside)
-    first = np.flatnonzero(np.diff(row, prepend=-1))
-    node = near[inside]
-    node[first[lost]] = nearest[lost]
-    r = points[row] - jets.points[node]
-    unit, rho = jets.spacing[node], jets.reach[node]
-    frame = jets.frames[node]
-    local = np.einsum("lix,lx->li", frame, r)
-    q, slopes, bends = _quartic(jets.coefficients[node], local[:, 0] / unit, local[:, 1] / unit, second)
-    g = local[:, 2] - unit * q
-    dg = frame[:, 2] - slopes[:, :1] * frame[:, 0] - slopes[:, 1:] * frame[:, 1]
-    a = np.maximum(1.0 - np.einsum("lx,lx->l", r, r) / rho**2, 0.0)
+    count = np.count_nonzero(inside, axis=1)
+    first = np.cumsum(count) - count
+    pair = np.flatnonzero(inside)
+    node = near.ravel()[pair]
+    r = np.stack([a.ravel()[pair] for a in away])
+    r[:, first[lost]] = 0.0
+    x, y, z = r
+    _, _, _, _, thin, ax, ay, az, bx, by, bz, nx, ny, nz, *c = np.take(jets.columns, node, axis=1)
+    u, v = ax * x + ay * y + az * z, bx * x + by * y + bz * z
+    # h q by rising powers of u, each a polynomial in v
+    p0 = c[0] + v * (c[2] + v * (c[5] + v * (c[9] + v * c[14])))
+    p1 = c[1] + v * (c[4] + v * (c[8] + v * c[13]))
+    p2 = c[3] + v * (c[7] + v * c[12])
+    p3 = c[6] + v * c[11]
+    p4 = c[10]
+    d0 = c[2] + v * (2.0 * c[5] + v * (3.0 * c[9] + v * (4.0 * c[14])))
+    d1 = c[4] + v * (2.0 * c[8] + v * (3.0 * c[13]))
+    d2 = c[7] + v * (2.0 * c[12])
+    d3 = c[11]
+    g = nx * x + ny * y + nz * z - (p0 + u * (p1 + u * (p2 + u * (p3 + u * p4))))
+    by_u = p1 + u * (2.0 * p2 + u * (3.0 * p3 + u * (4.0 * p4)))
+    by_v = d0 + u * (d1 + u * (d2 + u * d3))
+    gx, gy, gz = nx - by_u * ax - by_v * bx, ny - by_u * ay - by_v * by, nz - by_u * az - by_v * bz
+    a = np.maximum(1.0 - square.ravel()[pair] * thin, 0.0)
     a[first[lost]] = 1.0
-    phi = a**5
-    dphi = (-10.0 * a**4 / rho**2)[:, None] * r
-    total = np.add.reduceat(phi, first)
-    value = np.add.reduceat(phi * g, first) / total
-    dtotal = np.add.reduceat(dphi, first)
-    gradient = np.add.reduceat(dphi * g[:, None] + phi[:, None] * dg, first)
-    gradient = (gradient - value[:, None] * dtotal) / total[:, None]
-    # the tangent plane for the lost
-    plane = jets.frames[nearest[lost], 2]
-    value[lost] = np.einsum("lx,lx->l", plane, points[lost] - jets.points[nearest[lost]])
+    cube = a * a * a
+    phi = cube * a * a
+    slope = -10.0 * thin * (cube * a)
+    sx, sy, sz = slope * x, slope * y, slope * z
+    sums = np.empty((8, len(a)))
+    sums[0], sums[1], sums[2], sums[3], sums[4] = phi, phi * g, sx, sy, sz
+    sums[5], sums[6], sums[7] = sx * g + phi * gx, sy * g + phi * gy, sz * g + phi * gz
+    total, value, *rest = np.add.reduceat(sums, first, axis=1)
+    value /= total
+    dtotal, rise = np.array(rest[:3]), np.array(rest[3:])
+    gradient = np.ascontiguousarray(((rise - value * dtotal) / total).T)
+    home = nearest[lost]
+    plane = jets.frames[home, 2]
+    value[lost] = np.einsum("lx,lx->l", plane, points[lost] - jets.points[home])
     gradient[lost] = plane
-    if not second or bends is None:
+    if not second:
         return value, gradient, None
-    e1, e2 = frame[:, 0], frame[:, 1]
-    uu, uv, vv = (-phi * b / unit for b in bends)
-    across = uu[:, None] * e1 + uv[:, None] * e2
-    down = uv[:, None] * e1 + vv[:, None] * e2
-    terms = across[:, :, None] * e1[:, None, :] + down[:, :, None] * e2[:, None, :]
-    pair = dphi[:, :, None] * dg[:, None, :]
-    terms += pair + pair.transpose(0, 2, 1)
+    uu = phi * (2.0 * p2 + u * (6.0 * p3 + u * (12.0 * p4)))
+    uv = phi * (d1 + u * (2.0 * d2 + u * (3.0 * d3)))
+    e0, e1 = 2.0 * c[5] + v * (6.0 * c[9] + v * (12.0 * c[14])), 2.0 * c[8] + v * (6.0 * c[13])
+    vv = phi * (e0 + u * (e1 + u * (2.0 * c[12])))
+    mx, my, mz = uu * ax + uv * bx, uu * ay + uv * by, uu * az + uv * bz
+    ox, oy, oz = uv * ax + vv * bx, uv * ay + vv * by, uv * az + vv * bz
     # φ'' (g − f): the − f S'' of the quotient taken in at once
-    left = g - value[row]
-    terms += (80.0 * a**3 / rho**4 * left)[:, None, None] * (r[:, :, None] * r[:, None, :])
-    terms += (-10.0 * a**4 / rho**2 * left)[:, None, None] * np.eye(3)
-    hessian = np.add.reduceat(terms, first)
-    mixed = gradient[:, :, None] * dtotal[:, None, :]
+    left = g - np.repeat(value, count)
+    twice, flat = 80.0 * cube * thin * thin * left, slope * left
+    tx, ty, tz = twice * x, twice * y, twice * z
+    terms = np.empty((6, len(a)))
+    terms[0] = tx * x + flat + 2.0 * sx * gx - mx * ax - ox * bx
+    terms[1] = tx * y + sx * gy + sy * gx - mx * ay - ox * by
+    terms[2] = tx * z + sx * gz + sz * gx - mx * az - ox * bz
+    terms[3] = ty * y + flat + 2.0 * sy * gy - my * ay - oy * by
+    terms[4] = ty * z + sy * gz + sz * gy - my * az - oy * bz
+    terms[5] = tz * z + flat + 2.0 * sz * gz - mz * az - oz * bz
+    hessian = np.add.reduceat(terms, first, axis=1)[[0, 1, 2, 1, 3, 4, 2, 4, 5]].T.reshape(-1, 3, 3)
+    mixed = gradient[:, :, None] * dtotal.T[:, None, :]
     hessian = (hessian - mixed - mixed.transpose(0, 2, 1)) / total[:, None, None]
     hessian[lost] = 0.0
     return value, gradient, hessian
-
-
-def _quartic(c: Floats, u: Floats, v: Floats, second: bool) -> tuple[Floats, Floats, list[Floats] | None]:
-    """q and its derivatives from coefficients (l, 15): in u, Horner's rule with polynomials in v."""
-    table = {power: c[:, k] for k, power in enumerate(POWERS)}
-    # rows[i]: coefficient of u^i as a polynomial in v, and its first two derivatives
-    rows, first, bend = [], [], []
-    for i in range(5):
-        column = [table[i, j] for j in range(5 - i)]
-        rows.append(_horner(column, v))
-        first.append(_horner([j * column[j] for j in range(1, len(column))], v))
-        bend.append(_horner([j * (j - 1) * column[j] for j in range(2, len(column))], v))
-    q = _horner(rows, u)
-    by_u = _horner([i * rows[i] for i in range(1, 5)], u)
-    by_v = _horner(first, u)
-    slopes = np.stack([by_u, by_v], axis=1)
-    if not second:
-        return q, slopes, None
-    uu = _horner([i * (i - 1) * rows[i] for i in range(2, 5)], u)
-    uv = _horner([i * first[i] for i in range(1, 5)], u)
-    return q, slopes, [uu, uv, _horner(bend, u)]
-
-
-def _horner(coefficients: list[Floats], x: Floats) -> Floats:
-    """Σ c_k x^k; nothing gives 0."""
-    total = np.zeros_like(x)
-    for c in reversed(coefficients):
-        total = total * x + c
-    return total

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from warpedfoam.arrays import Floats
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
-from warpedfoam.plot.style import write_figure
+from warpedfoam.plot.style import LEAST, Style, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,14 +62,27 @@ class Charted:
         return target
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure that no window belongs to."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def beside(
+    style: Style, height: float, count: int, shares: Sequence[float] | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Panels beside each other on a figure ``height`` inches high, or one below the other on a narrow one."""
+    if style.narrow:
+        return style.panels(count)
+    figure = style.figure(height * style.width / style.usual)
+    return figure, list(np.atleast_1d(figure.subplots(1, count, width_ratios=shares)))
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+
+def with_inset(
+    style: Style, height: float, place: tuple[float, float, float, float]
+) -> tuple[Figure, Axes, Axes, Style]:
+    """A panel with another one in it, which stands below it on a narrow figure; and the style of that."""
+    if style.narrow:
+        figure, (axes, below) = style.panels(2)
+        return figure, axes, below, style
+    figure, (axes,) = beside(style, height, 1)
+    # letters of an inset are a fifth smaller, but readable
+    less = replace(style, text=max(LEAST, 0.8 * style.text), small=max(LEAST, 0.7 * style.text))
+    return figure, axes, axes.inset_axes(place), less
 
 
 def shade_of(place: int, count: int) -> tuple[float, float, float]:
@@ -79,11 +93,12 @@ def shade_of(place: int, count: int) -> tuple[float, float, float]:
     return float(red), float(green), float(blue)
 
 
-def degrees_axis(axes: Axes) -> None:
-    """φ from 0 to 180 degrees, marked at the outer and inner equator."""
+def degrees_axis(axes: Axes, *, short: bool = False) -> None:
+    """φ from 0 to 180 degrees, marked at the outer and inner equator; named in two lines if ``short``."""
     axes.set_xlim(0.0, 180.0)
     axes.set_xticks(np.arange(0.0, 181.0, 45.0))
-    axes.set_xlabel("φ (degrees; 0 outer, 180 inner equator)")
+    name = "φ (degrees)\n0 outer, 180 inner equator" if short else "φ (degrees; 0 outer, 180 inner equator)"
+    axes.set_xlabel(name)
 
 
 def columns(**parts: Floats) -> dict[str, Floats]:

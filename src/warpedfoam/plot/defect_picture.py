@@ -10,8 +10,9 @@ from warpedfoam.analysis import BondOrder, DefectReport, bond_order, defects
 from warpedfoam.arrays import Bools, Floats, Ints, as_instance, frozen
 from warpedfoam.foam import Foam
 from warpedfoam.io.colours import BubbleColours, as_rgb, bubble_colours, ramp_rgb
-from warpedfoam.plot.foam_picture import Strokes, painted_foam
+from warpedfoam.plot.foam_picture import painted_foam
 from warpedfoam.plot.legends import counted_sides, explain, put_legend
+from warpedfoam.plot.painting import Strokes
 from warpedfoam.plot.style import Style
 
 if TYPE_CHECKING:

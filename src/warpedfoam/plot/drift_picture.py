@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +19,9 @@ from warpedfoam.io.colours import bubble_colours
 from warpedfoam.io.patches import bubble_patches
 from warpedfoam.io.trajectory import Trajectory
 from warpedfoam.motion.result import Drift
-from warpedfoam.plot.foam_picture import _default_view, _paint, _pair, _resolution
+from warpedfoam.plot.painting import as_pair, default_view, paint_foam, resolution
 from warpedfoam.plot.projection import View
+from warpedfoam.plot.style import Style
 from warpedfoam.surfaces import Sphere
 
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ def plot_drift(
     color_by: str = "charge",
     view: tuple[float, float] | None = None,
     size: tuple[float, float] = (10.0, 6.4),
+    width: float | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw some frames of a drift over its energy against time; T1s are marked on the line.
@@ -61,6 +64,8 @@ def plot_drift(
         Elevation and azimuth in degrees; by default from where the bubbles of clusters are seen best.
     size : (float, float), optional
         Width and height in inches.
+    width : float, optional
+        Instead, the width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one column.
     title : str, optional
 
     Returns
@@ -73,9 +78,6 @@ def plot_drift(
     TypeError, ValueError
         If ``drift`` is not a Drift, a frame is not there, or an option is unknown.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     as_instance(drift, "drift", Drift)
     chosen = _spread(drift) if frames is None else [int(k) for k in frames]
     if not 1 <= len(chosen) <= 8:
@@ -85,18 +87,32 @@ def plot_drift(
         as_integer(k, "frames", minimum=-last - 1, maximum=last)
     shown = [drift.foams[k] for k in chosen]
     stage = _Stage(drift.foams, view)
-    figure = Figure(figsize=_pair(size, "size"), layout="constrained")
-    FigureCanvasAgg(figure)
-    if title is not None:
-        figure.suptitle(title)
-    grid = figure.add_gridspec(2, len(shown), height_ratios=(1.5, 1.0))
-    for column, (k, foam) in enumerate(zip(chosen, shown, strict=True)):
-        axes = figure.add_subplot(grid[0, column])
-        stage.paint(axes, foam, color_by)
-        axes.set_title(f"t = {drift.times[k]:.4g}", fontsize=10)
-    axes = figure.add_subplot(grid[1, :])
-    _energy_axes(axes, drift)
-    axes.plot(drift.times[chosen], drift.energies[chosen], "o", color="0.15", ms=4, zorder=3)
+    wide, high = as_pair(size, "size")
+    if min(wide, high) < 1.0:
+        raise ValueError(f"size must be at least 1 inch each way, got {wide:g} by {high:g}")
+    if width is None:
+        style = replace(Style.of(None, float(np.clip(25.4 * wide, 40.0, 1000.0))), width=wide, narrow=False)
+    else:
+        style = Style.of(width)
+    columns = min(len(shown), 2) if style.narrow else len(shown)
+    rows = -(-len(shown) // columns)
+    picture, chart = style.width / columns + style.rise, 0.62 * style.width
+    with style.context():
+        if style.narrow:
+            figure, heights = style.figure(rows * picture + chart), (*[picture] * rows, chart)
+        else:
+            figure, heights = style.figure(high * style.width / wide), (1.5, 1.0)
+        if title is not None:
+            figure.suptitle(title, fontsize=style.title)
+        grid = figure.add_gridspec(rows + 1, columns, height_ratios=heights)
+        for place, (k, foam) in enumerate(zip(chosen, shown, strict=True)):
+            axes = figure.add_subplot(grid[place // columns, place % columns])
+            stage.paint(axes, foam, color_by)
+            axes.set_title(f"t = {drift.times[k]:.4g}", fontsize=style.text)
+        axes = figure.add_subplot(grid[rows, :])
+        _energy_axes(axes, drift, style)
+        at = drift.times[chosen], drift.energies[chosen]
+        axes.plot(*at, "o", color="0.15", ms=4.0 * style.line, zorder=3)
     return figure
 
 
@@ -159,7 +175,7 @@ def animate(
         energies = np.array([foam.energy for foam in foams])
     if not 1 <= len(foams) <= MOST_FRAMES:
         raise ValueError(f"trajectory must hold 1 to {MOST_FRAMES} frames, got {len(foams)}")
-    pictures = _pictures(foams, times, energies, color_by, view, _pair(size, "size"), dots)
+    pictures = _pictures(foams, times, energies, color_by, view, as_pair(size, "size"), dots)
     if target.suffix.lower() == ".gif":
         _write_gif(target, pictures, rate)
     else:
@@ -237,13 +253,13 @@ class _Stage:
 
     def __init__(self, foams: Sequence[Foam], view: tuple[float, float] | None) -> None:
         first = foams[0]
-        segments, rings = _resolution(first.n_bubbles)
+        segments, rings = resolution(first.n_bubbles)
         self._segments, self._rings = segments, rings
         patches = bubble_patches(first, curve_points=segments + 1, rings=rings)
         if view is None:
-            elevation, azimuth = _towards(foams) or _default_view(first, patches)
+            elevation, azimuth = _towards(foams) or default_view(first, patches)
         else:
-            elevation, azimuth = _pair(view, "view")
+            elevation, azimuth = as_pair(view, "view")
         self._view = View.from_angles(elevation, azimuth)
         flat = self._view.project(patches.points)[:, :2]
         low, high = flat.min(axis=0), flat.max(axis=0)
@@ -262,7 +278,7 @@ class _Stage:
         axes.set_aspect("equal")
         axes.set_axis_off()
         patches = bubble_patches(foam, curve_points=self._segments + 1, rings=self._rings)
-        _paint(axes, foam, patches, bubble_colours(foam, color_by), self._view, self._segments, None)
+        paint_foam(axes, foam, patches, bubble_colours(foam, color_by), self._view, self._segments, None)
         if self._box is not None:
             low, high = self._box
             axes.set_xlim(low[0], high[0])
@@ -301,22 +317,22 @@ def _spread(drift: Drift) -> list[int]:
     return sorted({0, *found, count - 1})
 
 
-def _energy_axes(axes: Axes, drift: Drift) -> None:
-    axes.plot(drift.step_times, drift.step_energies, color="#2f78bd", lw=1.4)
+def _energy_axes(axes: Axes, drift: Drift, style: Style) -> None:
+    axes.plot(drift.step_times, drift.step_energies, color="#2f78bd", lw=1.4 * style.line)
     if drift.events:
         axes.plot(
             [e.time for e in drift.events],
             [e.energy_after for e in drift.events],
             "|",
             color="#cc3d28",
-            ms=12,
+            ms=12 * style.line,
             label="T1",
         )
         axes.legend(frameon=False)
-    _label(axes, drift.energies)
+    _label(axes, drift.energies, style.small)
 
 
-def _label(axes: Any, energies: Floats) -> None:
+def _label(axes: Any, energies: Floats, small: float = 9.0) -> None:
     """Names of the axes; the fall in which a raw start finds its shape is cut off, and said so."""
     if len(energies) > 3:
         low, high = float(energies.min()), float(energies[1:].max())
@@ -324,7 +340,7 @@ def _label(axes: Any, energies: Floats) -> None:
             room = 0.1 * (high - low)
             axes.set_ylim(low - room, high + room)
             axes.annotate(
-                f"from {energies[0]:.6g} at first", (0.02, 0.9), xycoords="axes fraction", fontsize=9
+                f"from {energies[0]:.6g} at first", (0.02, 0.9), xycoords="axes fraction", fontsize=small
             )
     axes.set_xlabel("time")
     axes.set_ylabel("energy")

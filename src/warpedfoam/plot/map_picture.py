@@ -51,7 +51,7 @@ def plot_map(
     ----------
     foam : Foam
         On a surface that has a map: a torus, cylinder, catenoid, surface of revolution, plane, landscape
-        over a rectangle, sphere, or another surface that every ray from the origin meets once.
+        over a rectangle or a disk, sphere, or another surface that every ray from the origin meets once.
     projection : str, optional
         Of a torus or a surface of revolution: "angles" (the angle θ round the axis against the tube angle φ,
         or against height, with lengths up and down to scale), "equal_area" or "conformal". Of a sphere and
@@ -239,7 +239,8 @@ def _frame(axes: Axes, foam: Foam, chart: Chart, edges: list[Floats], style: Sty
     joined = getattr(chart, "joined", None)
     rim = foam.cell.surface.rim is not None
     if joined is None or chart.axes() is None:
-        _lines(axes, [np.concatenate([e, e[:1]]) for e in edges], FILM_COLOUR, 0.8 * style.line, zorder=3.0)
+        thick = (2.2 if rim else 0.8) * style.line
+        _lines(axes, [np.concatenate([e, e[:1]]) for e in edges], FILM_COLOUR, thick, zorder=3.0)
         return
     around = np.concatenate([edges[0], edges[0][:1]])
     sides = [around[k : k + len(around) // 4 + 1] for k in range(0, len(around) - 1, len(around) // 4)]

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from warpedfoam import theory
 from warpedfoam.arrays import Floats, as_floats, as_number
-from warpedfoam.plot.charted import Charted, columns, degrees_axis, new_figure, shade_of
+from warpedfoam.plot.charted import Charted, beside, columns, degrees_axis, shade_of, with_inset
+from warpedfoam.plot.style import LEAST, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +32,7 @@ def figure_curvature(
     major_radius: float = RING,
     minor_radius: float = TUBE,
     sphere_radii: tuple[float, float] = RADII,
+    width: float | None = None,
 ) -> Charted:
     """G, cone angle ρ sqrt|G| and relative gap d sqrt|G| along φ on a torus (the paper's Fig. gcurvature).
 
@@ -43,6 +45,9 @@ def figure_curvature(
         The torus.
     sphere_radii : (float, float)
         Spheres whose constant values are drawn beside, dotted.
+    width : float, optional
+        Width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one column, whose panels
+        stand one below the other.
 
     Returns
     -------
@@ -59,36 +64,40 @@ def figure_curvature(
     g = theory.torus_gaussian_curvature(np.radians(phi), major_radius, minor_radius)
     angle = theory.cone_angle(v[:, None], gap, g)
     star = theory.relative_gap(gap, g)
-    figure = new_figure(12.0, 3.8)
-    left, middle, right = figure.subplots(1, 3)
-    left.plot(phi, g, color="#2f5fb3", label=f"torus {major_radius:g}, {minor_radius:g}")
-    left.axhline(0.0, color="#bbbbbb", linewidth=0.8)
-    left.set_ylabel("Gaussian curvature G")
-    for place, (volume, line) in enumerate(zip(v, angle, strict=True)):
-        middle.plot(phi, line, color=shade_of(place, len(v)), label=f"V = {volume:g}")
-    middle.set_ylabel("cone angle θ = ρ √|G|")
-    right.plot(phi, star, color="#2f5fb3")
-    right.set_ylabel("relative gap d* = d √|G|")
-    for radius, colour in zip(sphere_radii, ("#d9822b", "#c23030"), strict=True):
-        k = 1.0 / as_number(radius, "sphere_radii", positive=True)
-        style = {"color": colour, "linestyle": ":", "linewidth": 1.4}
-        left.axhline(k**2, label=f"sphere {radius:g}", **style)
-        volume = float(v.max() if radius == min(sphere_radii) else v.min())
-        extreme = float(theory.cone_angle(volume, gap, k**2))
-        middle.axhline(extreme, label=f"sphere {radius:g}, V = {volume:g}", **style)
-        right.axhline(float(theory.relative_gap(gap, k**2)), **style)
-    left.legend(frameon=False, fontsize=9)
-    middle.legend(frameon=False, fontsize=9)
-    for axes in (left, middle, right):
-        degrees_axis(axes)
-    for axes in (middle, right):
-        axes.set_ylim(bottom=0.0)
-    return Charted(
-        figure,
-        columns(
-            phi_degrees=phi, volume=v[:, None], gaussian_curvature=g, cone_angle=angle, relative_gap=star
-        ),
-    )
+    style = Style.of(width, 25.4 * 12.0)
+    with style.context():
+        tight = not style.narrow and style.width < 9.0  # three panels of less than 7 cm
+        figure, (left, middle, right) = beside(style, 5.6 if tight else 3.8, 3)
+        left.plot(phi, g, color="#2f5fb3", label=f"torus {major_radius:g}, {minor_radius:g}")
+        left.axhline(0.0, color="#bbbbbb", linewidth=0.8 * style.line)
+        left.set_ylabel("Gaussian curvature G")
+        for place, (volume, line) in enumerate(zip(v, angle, strict=True)):
+            middle.plot(phi, line, color=shade_of(place, len(v)), label=f"V = {volume:g}")
+        middle.set_ylabel("cone angle θ = ρ √|G|")
+        right.plot(phi, star, color="#2f5fb3")
+        right.set_ylabel("relative gap d* = d √|G|")
+        for radius, colour in zip(sphere_radii, ("#d9822b", "#c23030"), strict=True):
+            k = 1.0 / as_number(radius, "sphere_radii", positive=True)
+            dotted: dict[str, Any] = {"color": colour, "linestyle": ":", "linewidth": 1.4 * style.line}
+            left.axhline(k**2, label=f"sphere {radius:g}", **dotted)
+            volume = float(v.max() if radius == min(sphere_radii) else v.min())
+            extreme = float(theory.cone_angle(volume, gap, k**2))
+            middle.axhline(extreme, label=f"sphere {radius:g}, V = {volume:g}", **dotted)
+            right.axhline(float(theory.relative_gap(gap, k**2)), **dotted)
+        left.legend(frameon=False, handlelength=1.0 if tight else 2.0)
+        ncols, room = (1, 1.75) if tight else (2, 1.35)
+        fit = max(LEAST, style.small - 0.5)
+        middle.legend(frameon=False, loc="upper center", ncols=ncols, columnspacing=1.0, fontsize=fit)
+        for axes in (left, middle, right):
+            degrees_axis(axes, short=tight)
+        middle.set_ylim(0.0, room * float(angle.max()))
+        right.set_ylim(bottom=0.0)
+        return Charted(
+            figure,
+            columns(
+                phi_degrees=phi, volume=v[:, None], gaussian_curvature=g, cone_angle=angle, relative_gap=star
+            ),
+        )
 
 
 def figure_spheres(
@@ -97,6 +106,7 @@ def figure_spheres(
     *,
     sphere_radii: tuple[float, float] = RADII,
     points: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
+    width: float | None = None,
 ) -> Charted:
     """E/E0 against r/d between spheres, cone and second-order theory; inset: cone angle (Fig. spheres).
 
@@ -108,6 +118,9 @@ def figure_spheres(
         Least and greatest radius of the inner plate.
     points : (radii, volumes, ratios), optional
         Three (n,) arrays: 3D films to draw as dots.
+    width : float, optional
+        Width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one column, whose panels
+        stand one below the other.
 
     Returns
     -------
@@ -125,36 +138,40 @@ def figure_spheres(
     cone = theory.spherical_cone_ratio(v[:, None], gap, r)
     free = theory.second_order_ratio(v[:, None], gap, 1.0 / r, 1.0 / r)
     angle = theory.cone_angle(v[:, None], gap, r**-2.0)
-    figure = new_figure(7.4, 5.2)
-    axes = figure.subplots()
-    inset = axes.inset_axes((0.53, 0.10, 0.44, 0.42))
-    for k, volume in enumerate(v):
-        colour = shade_of(k, len(v))
-        axes.plot(r / gap, cone[k], "--", color=colour, linewidth=1.0)
-        axes.plot(r / gap, free[k], color=colour, label=f"V = {volume:g}, V* = {volume / gap**3:.2g}")
-        inset.plot(angle[k], free[k], color=colour, linewidth=1.0)
-    if points is not None:
-        at, size, ratio = _points(points)
-        for volume in np.unique(size):
-            mine = size == volume
-            place = int(np.abs(v - volume).argmin())
-            colour, angles = shade_of(place, len(v)), theory.cone_angle(volume, gap, at[mine] ** -2.0)
-            axes.plot(at[mine] / gap, ratio[mine], "o", color=colour, markersize=4.0)
-            inset.plot(angles, ratio[mine], "o", color=colour, markersize=2.0)
-    _styles(axes, "second-order theory", "spherical cone", "3D film" if points is not None else None)
-    axes.set_xlabel("r/d")
-    axes.set_ylabel("E/E₀")
-    axes.ticklabel_format(axis="y", useOffset=False)
-    # room below the lines for the inset
-    least = float(min(cone.min(), free.min()))
-    axes.set_ylim(least - 0.15 * (1.0 - least), 1.0 + 0.02 * (1.0 - least))
-    inset.set_xlabel("cone angle ρ/r", fontsize=8)
-    inset.set_ylabel("E/E₀", fontsize=8)
-    inset.tick_params(labelsize=7)
-    inset.ticklabel_format(axis="y", useOffset=False)
-    return Charted(
-        figure, columns(sphere_radius=r, volume=v[:, None], cone_angle=angle, cone=cone, second_order=free)
-    )
+    style = Style.of(width, 25.4 * 7.4)
+    with style.context():
+        figure, axes, inset, less = with_inset(style, 5.2, (0.53, 0.10, 0.44, 0.42))
+        for k, volume in enumerate(v):
+            colour = shade_of(k, len(v))
+            axes.plot(r / gap, cone[k], "--", color=colour, linewidth=style.line)
+            axes.plot(r / gap, free[k], color=colour, label=f"V = {volume:g}, V* = {volume / gap**3:.2g}")
+            inset.plot(angle[k], free[k], color=colour, linewidth=style.line)
+        if points is not None:
+            at, size, ratio = _points(points)
+            for volume in np.unique(size):
+                mine = size == volume
+                place = int(np.abs(v - volume).argmin())
+                colour, angles = shade_of(place, len(v)), theory.cone_angle(volume, gap, at[mine] ** -2.0)
+                axes.plot(at[mine] / gap, ratio[mine], "o", color=colour, markersize=4.0 * style.line)
+                inset.plot(angles, ratio[mine], "o", color=colour, markersize=2.0 * style.line)
+        _styles(
+            axes, style, "second-order theory", "spherical cone", "3D film" if points is not None else None
+        )
+        axes.set_xlabel("r/d")
+        axes.set_ylabel("E/E₀")
+        axes.ticklabel_format(axis="y", useOffset=False)
+        # room below the lines for the inset
+        least = float(min(cone.min(), free.min()))
+        room = 0.02 if style.narrow else 0.15
+        axes.set_ylim(least - room * (1.0 - least), 1.0 + 0.02 * (1.0 - least))
+        inset.set_xlabel("cone angle ρ/r", fontsize=less.text)
+        inset.set_ylabel("E/E₀", fontsize=less.text)
+        inset.tick_params(labelsize=less.small)
+        inset.ticklabel_format(axis="y", useOffset=False)
+        return Charted(
+            figure,
+            columns(sphere_radius=r, volume=v[:, None], cone_angle=angle, cone=cone, second_order=free),
+        )
 
 
 def figure_torus_energy(
@@ -164,6 +181,7 @@ def figure_torus_energy(
     major_radius: float = RING,
     minor_radius: float = TUBE,
     points: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
+    width: float | None = None,
 ) -> Charted:
     """E/E0 along φ on a torus: second order, the paper's cylinder, Δ(V) of its fit (Fig. tori_vary_phi_1).
 
@@ -174,6 +192,9 @@ def figure_torus_energy(
     major_radius, minor_radius : float
     points : (phi_degrees, volumes, ratios), optional
         Three (n,) arrays: 3D films to draw as dots; Δ is fitted to them too.
+    width : float, optional
+        Width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one column, whose panels
+        stand one below the other.
 
     Returns
     -------
@@ -193,55 +214,67 @@ def figure_torus_energy(
     ruled = theory.second_order_ratio(v[:, None], gap, k1, k2, film="ruled")
     cylinder = theory.fitted_ratio(1.0, v[:, None], gap, k1 * k2)
     delta = np.array([theory.fit_delta(free[k], volume, gap, k1 * k2) for k, volume in enumerate(v)])
-    figure = new_figure(7.4, 5.2)
-    axes = figure.subplots()
-    inset = axes.inset_axes((0.14, 0.56, 0.36, 0.38))
-    axes.axhline(1.0, color="#bbbbbb", linewidth=0.8)
-    for k, volume in enumerate(v):
-        colour = shade_of(k, len(v))
-        axes.plot(phi, cylinder[k], "--", color=colour, linewidth=1.0)
-        axes.plot(phi, free[k], color=colour, label=f"V = {volume:g}, V* = {volume / gap**3:.2g}")
-    if points is not None:
-        at, size, ratio = _points(points)
-        fits = []
-        for volume in np.unique(size):
-            mine = size == volume
-            place = int(np.abs(v - volume).argmin())
-            axes.plot(
-                at[mine], ratio[mine], "o", color=shade_of(place, len(v)), markersize=4.0, clip_on=False
-            )
-            g = theory.torus_gaussian_curvature(np.radians(at[mine]), major_radius, minor_radius)
-            fits.append(theory.fit_delta(ratio[mine], float(volume), gap, g))
-        inset.plot(np.unique(size) / gap**3, fits, "o", color="#222222", markersize=3.5)
-    many = np.linspace(0.9 * v.min(), 1.1 * v.max(), 41)
-    fitted = [
-        theory.fit_delta(theory.second_order_ratio(volume, gap, k1, k2), float(volume), gap, k1 * k2)
-        for volume in many
-    ]
-    inset.plot(many / gap**3, fitted, color="#222222", linewidth=1.2)
-    inset.axhline(1.0, color="#222222", linestyle="--", linewidth=0.8)
-    inset.axhline(0.75, color="#222222", linestyle=":", linewidth=0.8)
-    inset.set_xlabel("V* = V/d³", fontsize=8)
-    inset.set_ylabel("Δ of the fit (dotted: thin gap, ¾)", fontsize=8)
-    inset.tick_params(labelsize=7)
-    _styles(axes, "second-order theory", "E₀ − E₁G", "3D film" if points is not None else None, "lower right")
-    degrees_axis(axes)
-    axes.set_ylabel("E/E₀")
-    axes.ticklabel_format(axis="y", useOffset=False)
-    low, high = float(min(free.min(), cylinder.min())), float(max(free.max(), cylinder.max()))
-    # the lines rise to the right: the upper left is free for the inset, the lower right for the legend
-    axes.set_ylim(low - 0.05 * (high - low), high + 0.35 * (high - low))
-    return Charted(
-        figure,
-        columns(
-            phi_degrees=phi,
-            volume=v[:, None],
-            second_order=free,
-            ruled=ruled,
-            cylinder=cylinder,
-            delta=delta[:, None],
-        ),
-    )
+    style = Style.of(width, 25.4 * 7.4)
+    with style.context():
+        figure, axes, inset, less = with_inset(style, 5.2, (0.14, 0.56, 0.36, 0.38))
+        axes.axhline(1.0, color="#bbbbbb", linewidth=0.8 * style.line)
+        for k, volume in enumerate(v):
+            colour = shade_of(k, len(v))
+            axes.plot(phi, cylinder[k], "--", color=colour, linewidth=style.line)
+            axes.plot(phi, free[k], color=colour, label=f"V = {volume:g}, V* = {volume / gap**3:.2g}")
+        if points is not None:
+            at, size, ratio = _points(points)
+            fits = []
+            for volume in np.unique(size):
+                mine = size == volume
+                place = int(np.abs(v - volume).argmin())
+                axes.plot(
+                    at[mine],
+                    ratio[mine],
+                    "o",
+                    color=shade_of(place, len(v)),
+                    markersize=4.0 * style.line,
+                    clip_on=False,
+                )
+                g = theory.torus_gaussian_curvature(np.radians(at[mine]), major_radius, minor_radius)
+                fits.append(theory.fit_delta(ratio[mine], float(volume), gap, g))
+            inset.plot(np.unique(size) / gap**3, fits, "o", color="#222222", markersize=3.5 * style.line)
+        many = np.linspace(0.9 * v.min(), 1.1 * v.max(), 41)
+        fitted = [
+            theory.fit_delta(theory.second_order_ratio(volume, gap, k1, k2), float(volume), gap, k1 * k2)
+            for volume in many
+        ]
+        inset.plot(many / gap**3, fitted, color="#222222", linewidth=1.2 * style.line)
+        inset.axhline(1.0, color="#222222", linestyle="--", linewidth=0.8 * style.line)
+        inset.axhline(0.75, color="#222222", linestyle=":", linewidth=0.8 * style.line)
+        inset.set_xlabel("V* = V/d³", fontsize=less.text)
+        inset.set_ylabel("Δ (dotted: thin gap, ¾)", fontsize=less.text)
+        inset.tick_params(labelsize=less.small)
+        _styles(
+            axes,
+            style,
+            "second-order theory",
+            "E₀ − E₁G",
+            "3D film" if points is not None else None,
+            "lower right",
+        )
+        degrees_axis(axes)
+        axes.set_ylabel("E/E₀")
+        axes.ticklabel_format(axis="y", useOffset=False)
+        low, high = float(min(free.min(), cylinder.min())), float(max(free.max(), cylinder.max()))
+        # the lines rise to the right: the upper left is free for the inset, the lower right for the legend
+        axes.set_ylim(low - 0.05 * (high - low), high + (0.05 if style.narrow else 0.35) * (high - low))
+        return Charted(
+            figure,
+            columns(
+                phi_degrees=phi,
+                volume=v[:, None],
+                second_order=free,
+                ruled=ruled,
+                cylinder=cylinder,
+                delta=delta[:, None],
+            ),
+        )
 
 
 def figure_gap(
@@ -251,6 +284,7 @@ def figure_gap(
     major_radius: float = RING,
     minor_radius: float = TUBE,
     tilts: Sequence[float] = (0.0, 2e-4, 4e-4, 8e-4),
+    width: float | None = None,
 ) -> Charted:
     """How little plates may miss being parallel on a torus: balance GV/3π, and energies in a gap d + ε cos φ.
 
@@ -263,6 +297,9 @@ def figure_gap(
     tilts : sequence of float
         ε: how much wider the gap is on the outer equator, as when the tube of one plate is a little off
         centre.
+    width : float, optional
+        Width in millimetres at which the figure is to be printed, 40 … 1000: 86 for one column, whose panels
+        stand one below the other.
 
     Returns
     -------
@@ -279,38 +316,41 @@ def figure_gap(
     eps = as_floats(list(tilts), "tilts", (None,))
     phi = np.linspace(0.0, 180.0, 181)
     g = theory.torus_gaussian_curvature(np.radians(phi), major_radius, minor_radius)
-    figure = new_figure(10.5, 4.2)
-    left, right = figure.subplots(1, 2)
-    left.axhline(0.0, color="#bbbbbb", linewidth=0.8)
-    for k, volume in enumerate(v):
-        left.plot(
-            phi,
-            1e4 * theory.balancing_gap_change(volume, g),
-            color=shade_of(k, len(v)),
-            label=f"V = {volume:g}",
+    style = Style.of(width, 25.4 * 10.5)
+    with style.context():
+        figure, (left, right) = beside(style, 4.2, 2)
+        left.axhline(0.0, color="#bbbbbb", linewidth=0.8 * style.line)
+        for k, volume in enumerate(v):
+            left.plot(
+                phi,
+                1e4 * theory.balancing_gap_change(volume, g),
+                color=shade_of(k, len(v)),
+                label=f"V = {volume:g}",
+            )
+        left.set_ylabel("balancing δd = GV/3π  (10⁻⁴)")
+        left.legend(frameon=False)
+        chosen = float(v[len(v) // 2])
+        energy = theory.flat_energy(chosen, gap)
+        change = theory.curvature_energy_change(chosen, gap, g)
+        change = change + theory.gap_energy_change(
+            chosen, gap, eps[:, None] * np.cos(np.radians(phi)), exact=True
         )
-    left.set_ylabel("balancing δd = GV/3π  (10⁻⁴)")
-    left.legend(frameon=False, fontsize=9)
-    chosen = float(v[len(v) // 2])
-    energy = theory.flat_energy(chosen, gap)
-    change = theory.curvature_energy_change(chosen, gap, g)
-    change = change + theory.gap_energy_change(
-        chosen, gap, eps[:, None] * np.cos(np.radians(phi)), exact=True
-    )
-    ratio = 1.0 + change / energy
-    right.axhline(1.0, color="#bbbbbb", linewidth=0.8)
-    for k, tilt in enumerate(eps):
-        right.plot(phi, ratio[k], color=shade_of(k, len(eps)), label=f"ε = {tilt:g}")
-    right.set_ylabel(f"E/E₀ in a gap d + ε cos φ, V = {chosen:g}")
-    right.ticklabel_format(axis="y", useOffset=False)
-    right.legend(frameon=False, fontsize=9)
-    for axes in (left, right):
-        degrees_axis(axes)
-    balance = theory.balancing_gap_change(chosen, g)
-    return Charted(
-        figure,
-        columns(phi_degrees=phi, tilt=eps[:, None], volume=np.array(chosen), balance=balance, ratio=ratio),
-    )
+        ratio = 1.0 + change / energy
+        right.axhline(1.0, color="#bbbbbb", linewidth=0.8 * style.line)
+        for k, tilt in enumerate(eps):
+            right.plot(phi, ratio[k], color=shade_of(k, len(eps)), label=f"ε = {tilt:g}")
+        right.set_ylabel(f"E/E₀ in a gap d + ε cos φ, V = {chosen:g}")
+        right.ticklabel_format(axis="y", useOffset=False)
+        right.legend(frameon=False)
+        for axes in (left, right):
+            degrees_axis(axes)
+        balance = theory.balancing_gap_change(chosen, g)
+        return Charted(
+            figure,
+            columns(
+                phi_degrees=phi, tilt=eps[:, None], volume=np.array(chosen), balance=balance, ratio=ratio
+            ),
+        )
 
 
 def _points(points: tuple[ArrayLike, ArrayLike, ArrayLike]) -> tuple[Floats, Floats, Floats]:
@@ -323,6 +363,7 @@ def _points(points: tuple[ArrayLike, ArrayLike, ArrayLike]) -> tuple[Floats, Flo
 
 def _styles(
     axes: Axes,
+    style: Style,
     full: str,
     dashed: str,
     dots: str | None,
@@ -334,8 +375,17 @@ def _styles(
     handles: list[Any] = list(axes.get_legend_handles_labels()[0])
     handles += [
         Line2D([], [], color="#222222", label=full),
-        Line2D([], [], color="#222222", linestyle="--", linewidth=1.0, label=dashed),
+        Line2D([], [], color="#222222", linestyle="--", linewidth=style.line, label=dashed),
     ]
     if dots is not None:
-        handles.append(Line2D([], [], color="#222222", marker="o", linestyle="", markersize=4.0, label=dots))
-    axes.legend(handles=handles, frameon=False, fontsize=8, loc=place)
+        handles.append(
+            Line2D([], [], color="#222222", marker="o", linestyle="", markersize=4.0 * style.line, label=dots)
+        )
+    if style.narrow:
+        # above the panel: there is no room in it
+        axes.legend(
+            handles=handles, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2,
+            columnspacing=1.0,
+        )  # fmt: skip
+    else:
+        axes.legend(handles=handles, frameon=False, loc=place, fontsize=max(LEAST, style.small - 1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,8 @@ class Style:
         Sizes of labels, of ticks and of titles.
     line : float
         Factor for widths of lines, 1 at the usual width.
+    usual : float
+        Width in inches of the figure without a width.
     narrow : bool
         Whether panels and legends stand one below the other.
     """
@@ -48,6 +51,7 @@ class Style:
     small: float
     title: float
     line: float
+    usual: float
     narrow: bool
 
     @classmethod
@@ -62,7 +66,8 @@ class Style:
         mm = usual if width is None else as_number(width, "width", minimum=40.0, maximum=1000.0)
         share = (mm - COLUMN) / (USUAL - COLUMN)
         text = float(np.clip(_AT_COLUMN + share * (_AT_USUAL - _AT_COLUMN), LEAST + 0.5, _AT_USUAL))
-        return cls(mm / 25.4, text, max(LEAST, text - 1.0), 1.15 * text, text / _AT_USUAL, mm < NARROW)
+        sizes = text, max(LEAST, text - 1.0), 1.15 * text
+        return cls(mm / 25.4, *sizes, text / _AT_USUAL, usual / 25.4, mm < NARROW)
 
     @property
     def rise(self) -> float:
@@ -77,6 +82,28 @@ class Style:
         figure = Figure(figsize=(self.width, height), layout="constrained")
         FigureCanvasAgg(figure)
         return figure
+
+    def context(self) -> AbstractContextManager[None]:
+        """Letters, lines and ticks of this style for all that is drawn meanwhile."""
+        from matplotlib import rc_context
+
+        share = self.line
+        return rc_context(
+            {
+                "font.size": self.text,
+                "axes.labelsize": self.text,
+                "axes.titlesize": self.text,
+                "xtick.labelsize": self.small,
+                "ytick.labelsize": self.small,
+                "legend.fontsize": self.small,
+                "lines.linewidth": 1.5 * share,
+                "axes.linewidth": 0.8 * share,
+                "xtick.major.width": 0.8 * share,
+                "ytick.major.width": 0.8 * share,
+                "xtick.major.size": 3.5 * share,
+                "ytick.major.size": 3.5 * share,
+            }
+        )
 
     def panels(self, count: int) -> tuple[Figure, list[Axes]]:
         """Panels beside each other, or flatter ones below each other on a narrow figure."""

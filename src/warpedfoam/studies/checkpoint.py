@@ -15,6 +15,8 @@ from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io import load, save, write_record
 from warpedfoam.io.atomic import PathLike, as_path
+from warpedfoam.io.reading import brief
+from warpedfoam.io.record import sealed, unsealed
 from warpedfoam.studies.lock import locked
 from warpedfoam.surfaces.protocol import Surface
 
@@ -69,16 +71,20 @@ class Checkpoint:
             return None
         try:
             record = json.loads(self.path.read_text(encoding="utf-8"))
+            version = record["version"] if isinstance(record, dict) else None
+            if isinstance(version, int) and version > VERSION:
+                raise ValueError(f"it is of version {version}, this warpedfoam reads version {VERSION}")
+            record = unsealed(record, ("version", "key", "serial", "foams", "state"))
             key, state, foams = record["key"], record["state"], record["foams"]
-            version, self._serial = record["version"], int(record["serial"])
-        except (ValueError, KeyError, TypeError) as fault:
+            if not (version == VERSION and all(isinstance(part, dict) for part in (key, state, foams))):
+                raise ValueError("it is no such state")
+            if any(Path(name).name != name for name in foams.values()):
+                raise ValueError("it names foams in other folders")
+            self._serial = int(record["serial"])
+        except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as fault:
             raise FileFormatError(
-                f"cannot read {self.path}: it is damaged ({fault}); remove it to begin anew"
+                f"cannot read {self.path}: it is damaged ({brief(fault)}); remove it to begin anew"
             ) from fault
-        if version != VERSION:
-            raise FileFormatError(
-                f"{self.path} is of version {version!r}, this warpedfoam reads version {VERSION}"
-            )
         wanted = json.loads(json.dumps(self._key))
         different = sorted(k for k in {*wanted, *key} if wanted.get(k) != key.get(k))
         if different:
@@ -100,16 +106,14 @@ class Checkpoint:
                 save(self._folder / name, foam)
                 self._saved[id(foam)] = (name, foam)
             names[role] = self._saved[id(foam)][0]
-        write_record(
-            self.path,
-            {
-                "version": VERSION,
-                "key": self._key,
-                "serial": self._serial,
-                "foams": names,
-                "state": state,
-            },
-        )
+        record = {
+            "version": VERSION,
+            "key": self._key,
+            "serial": self._serial,
+            "foams": names,
+            "state": state,
+        }
+        write_record(self.path, sealed(record))
         kept = set(names.values())
         self._saved = {i: entry for i, entry in self._saved.items() if entry[0] in kept}
         for path in self._folder.glob(f"{self._kind}-[0-9][0-9][0-9][0-9][0-9][0-9].npz"):

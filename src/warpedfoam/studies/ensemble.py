@@ -211,7 +211,7 @@ def run_ensemble(
             "processor_seconds": float(sum(row["seconds"] for row in used)),
             "clock_seconds": time.perf_counter() - clock,
             "started": started.isoformat(timespec="seconds"),
-            "environments": {name: journal.environments[name] for name in names},
+            "environments": {name: journal.environments.get(name, {}) for name in names},
             "versions": versions(),
             "outputs": [str(place / name) for name in (TABLE_CSV, TABLE_PARQUET, RECORD)],
         }

@@ -12,10 +12,10 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.foam import Foam
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
-from warpedfoam.relax.driver import EXACT_BELOW, SOFTNESS, VOLUME_STEP
 from warpedfoam.relax.held import held_vertices, moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
+from warpedfoam.relax.steps import EXACT_BELOW, SOFTNESS, VOLUME_STEP
 from warpedfoam.relax.system import Linearised, State, Step, System, one_ring, pinned_unknowns, rigid_modes
 
 #: Order of the rays from the held point to the outer films, and by how much rays outnumber a film's nodes.

@@ -15,10 +15,13 @@ from typing import Any
 
 from warpedfoam.errors import FileFormatError
 from warpedfoam.io.atomic import atomic_binary, named
+from warpedfoam.io.reading import brief
+from warpedfoam.io.record import sealed, unsealed
 from warpedfoam.studies.lock import locked
 from warpedfoam.studies.member import Outcome, environment_name
 
 JOURNAL, STATES = "runs.jsonl", "states"
+_ROW = ("key", "status", "reason", "values", "environment", "seconds")
 
 
 class Journal:
@@ -73,7 +76,7 @@ class Journal:
 
     def _write(self, content: Mapping[str, Any]) -> None:
         # repr of a float, which is what JSON gets, comes back as the same float
-        line = json.dumps(content, allow_nan=False, ensure_ascii=False)
+        line = json.dumps(sealed(content), allow_nan=False, ensure_ascii=False)
         try:
             self._stream.write(line.encode("utf-8") + b"\n")
             self._stream.flush()
@@ -91,16 +94,17 @@ class Journal:
                 stream.truncate(whole)
         for number, line in enumerate(data[:whole].splitlines(), start=1):
             try:
-                content = json.loads(line)
-                if "content" in content:
+                found = json.loads(line)
+                if "content" in found:
+                    content = unsealed(found, ("environment", "content"))
                     self.environments[content["environment"]] = content["content"]
                 else:
-                    _ = [content[name] for name in ("status", "reason", "values", "environment", "seconds")]
-                    self.rows[content["key"]] = content
-            except (ValueError, KeyError, TypeError) as fault:
+                    row = unsealed(found, _ROW)
+                    self.rows[row["key"]] = row
+            except (ValueError, KeyError, TypeError, RecursionError) as fault:
                 raise FileFormatError(
-                    f"cannot read {self._path}: line {number} is damaged ({fault}); delete that line and its "
-                    "run will be computed again"
+                    f"cannot read {self._path}: line {number} is damaged ({brief(fault)}); delete that line "
+                    "and its run will be computed again"
                 ) from None
 
 

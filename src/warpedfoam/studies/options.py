@@ -14,7 +14,7 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
-from warpedfoam.studies.sizes import SIZES
+from warpedfoam.sizes import SIZES
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,

@@ -18,9 +18,9 @@ import numpy as np
 
 from warpedfoam.arrays import as_flag, as_integer, as_number
 from warpedfoam.cell import HeleShawCell
+from warpedfoam.sizes import SIZES
 from warpedfoam.studies.observables import Observable, look_in, observable_from
 from warpedfoam.studies.options import Options, Places, option_names, options_from, read_values
-from warpedfoam.studies.sizes import SIZES
 
 #: Sections of options that a study shares with the main job.
 SHARED = ("surface", "cell", "foam", "relax")

@@ -5,6 +5,7 @@ from warpedfoam.surfaces.cylinder import Cylinder
 from warpedfoam.surfaces.ellipsoid import Ellipsoid
 from warpedfoam.surfaces.files import read_mesh
 from warpedfoam.surfaces.flat_torus import FlatTorus
+from warpedfoam.surfaces.formula import Formula
 from warpedfoam.surfaces.formula_gap import FormulaGap
 from warpedfoam.surfaces.gap_field import FunctionGap, GapField
 from warpedfoam.surfaces.gaps import LinearGap, ShiftedSphereGap, ShiftedTubeGap
@@ -28,6 +29,7 @@ __all__ = [
     "Cylinder",
     "Ellipsoid",
     "FlatTorus",
+    "Formula",
     "FormulaGap",
     "FunctionGap",
     "GapField",

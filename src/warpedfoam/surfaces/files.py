@@ -15,6 +15,8 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 #: Kinds of files by their endings, and those that write each triangle's corners anew.
 KINDS = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 SOUPS = (".stl", ".obj", ".glb", ".gltf")
+#: Kinds that may name files of materials.
+LINKED = (".ply", ".obj")
 #: Bytes in which a header must end for its counts to be looked at.
 HEAD = 65536
 
@@ -60,7 +62,13 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            found = trimesh.load_mesh(file, process=False, maintain_order=True)
+            # materials name other files: a mesh needs none of them
+            found = trimesh.load_mesh(
+                file,
+                process=False,
+                maintain_order=True,
+                **({"skip_materials": True} if kind in LINKED else {}),
+            )
         nodes, triangles = np.asarray(found.vertices), np.asarray(found.faces)
     except Exception as fault:  # whatever a damaged file makes the readers raise
         said = ascii(f"{type(fault).__name__}: {fault!s:.200}" if str(fault) else type(fault).__name__)[1:-1]
@@ -78,7 +86,9 @@ def read_mesh(path: str | PathLike[str]) -> TriangleMesh:
             f"cannot read {file}: it holds {len(nodes)} points but no triangles; "
             + ("save its faces too" if len(nodes) else f"it is damaged, or no {kind[1:].upper()} mesh")
         )
-    if kind in SOUPS and np.isfinite(nodes).all():
+    # what is out of range is refused below
+    named = triangles.min() >= 0 and triangles.max() < len(nodes)
+    if kind in SOUPS and named and np.isfinite(nodes).all():
         # + 0.0: the two zeros are one place
         _, first, place = np.unique(nodes + 0.0, axis=0, return_index=True, return_inverse=True)
         order = np.argsort(first)

@@ -11,6 +11,7 @@ import numpy as np
 from warpedfoam.arrays import Bools, Floats, Ints, as_flag, as_floats, as_number
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.surfaces.flat_torus import FlatTorus
+from warpedfoam.surfaces.formula import Formula
 from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.protocol import SIZES
@@ -27,14 +28,15 @@ class Graph(LevelSurface):
     """z = h(x, y) over a rectangle or a disk about the origin; the gap lies above.
 
     The surface ends in a rim along the domain's edge, which has corners over a rectangle; a periodic
-    one has the opposite sides of its rectangle joined.
+    one has the opposite sides of its rectangle joined. Made by `from_formula` its derivatives are exact,
+    and a foam on it can be saved.
 
     Parameters
     ----------
     function : callable
         h at points (n, 2), returning (n,); smooth, also a little beyond the rim.
-    gradient : callable
-        (∂h/∂x, ∂h/∂y) the same way, returning (n, 2).
+    gradient : callable or None
+        (∂h/∂x, ∂h/∂y) the same way, returning (n, 2); None if ``function`` is a `Formula`.
     width, height : float
         Sides along x and y, above 0; diameters of a disk.
     periodic : bool, optional
@@ -57,19 +59,28 @@ class Graph(LevelSurface):
     ... )
     >>> bool(abs(hills.gaussian_curvature([[0.0, 0.0, 2.0]])[0] - k**4) < 1e-5)
     True
+
+    The same by its formula:
+
+    >>> hills = Graph.from_formula("cos(pi*x/5) + cos(pi*y/5)", 10.0, 10.0, periodic=True)
+    >>> bool(abs(hills.gaussian_curvature([[0.0, 0.0, 2.0]])[0] - k**4) < 1e-14)
+    True
     """
 
     function: Callable[[Floats], Floats]
-    gradient: Callable[[Floats], Floats]
+    gradient: Callable[[Floats], Floats] | None
     width: float
     height: float
     periodic: bool = False
     disk: bool = False
 
     def __post_init__(self) -> None:
+        exact = isinstance(self.function, Formula)
         for name in ("function", "gradient"):
-            if not callable(getattr(self, name)):
+            if not callable(getattr(self, name)) and not (exact and self.gradient is None):
                 raise TypeError(f"{name} must be callable, got {type(getattr(self, name)).__name__}")
+        if isinstance(self.function, Formula) and self.function.variables != "xy":
+            raise ValueError(f"function must be a formula of x and y, got one of {self.function.variables}")
         for name in ("width", "height"):
             object.__setattr__(self, name, as_number(getattr(self, name), name, positive=True, **SIZES))
         if as_flag(self.disk, "disk") and (as_flag(self.periodic, "periodic") or self.width != self.height):
@@ -83,11 +94,18 @@ class Graph(LevelSurface):
             if off > FAULT * steep * float(side.sum()):
                 raise ValueError(f"function does not repeat after {side.tolist()}: it differs by {off:.3g}")
         h = STEP * self.width
-        for k, axis in enumerate(np.eye(2)):
+        for k, axis in enumerate(() if self.gradient is None else np.eye(2)):
             found = (self._height(x + h * axis) - self._height(x - h * axis)) / (2.0 * h)
             off = float(np.abs(found - slope[:, k]).max())
             if not off <= FAULT * steep:
                 raise ValueError(f"gradient is not that of function: it is off by {off:.3g}")
+
+    @classmethod
+    def from_formula(
+        cls, formula: str, width: float, height: float, *, periodic: bool = False, disk: bool = False
+    ) -> Graph:
+        """The landscape of a formula of x and y, see `Formula`."""
+        return cls(Formula(formula, "xy"), None, width, height, periodic, disk)
 
     @property
     def _sheet(self) -> FlatTorus:
@@ -97,7 +115,20 @@ class Graph(LevelSurface):
         return as_floats(self.function(x.copy()), "function's values", (len(x),))
 
     def _slope(self, x: Floats) -> Floats:
-        return as_floats(self.gradient(x.copy()), "gradient's values", (len(x), 2))
+        slope = self.function.gradient if isinstance(self.function, Formula) else self.gradient
+        assert slope is not None
+        return as_floats(slope(x.copy()), "gradient's values", (len(x), 2))
+
+    def _bend(self, x: Floats) -> Floats:
+        """Second derivatives of h, (n, 2, 2)."""
+        if isinstance(self.function, Formula):
+            return as_floats(self.function.hessian(x.copy()), "function's derivatives", (len(x), 2, 2))
+        h = STEP * self.width
+        steps = h * np.eye(2)
+        rows = [(self._slope(x + step) - self._slope(x - step)) / (2.0 * h) for step in steps]
+        bend = np.stack(rows, axis=1)
+        out: Floats = 0.5 * (bend + bend.transpose(0, 2, 1))
+        return out
 
     @property
     def period(self) -> Floats | None:
@@ -130,11 +161,9 @@ class Graph(LevelSurface):
         value = points[:, 2] - self._height(x)
         if not second:
             return value, gradient, None
-        h = STEP * self.width
         bend = np.zeros((len(x), 3, 3))
-        for k, axis in enumerate(np.eye(2)):
-            bend[:, k, :2] = -(self._slope(x + h * axis) - self._slope(x - h * axis)) / (2.0 * h)
-        return value, gradient, 0.5 * (bend + bend.transpose(0, 2, 1))
+        bend[:, :2, :2] = -self._bend(x)
+        return value, gradient, bend
 
     def triangulate(self, n_nodes: int) -> TriangleMesh:
         """A triangulation of the domain, lifted."""

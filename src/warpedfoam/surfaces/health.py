@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_instance, as_integer, as_number
 from warpedfoam.errors import MeshError
+from warpedfoam.surfaces.holes import MOST_EDGES, closed_holes
 from warpedfoam.surfaces.mesh import TriangleMesh, flat_triangles
 from warpedfoam.surfaces.mesh_surface import MeshSurface, placement_fault
 from warpedfoam.surfaces.protocol import SIZES
@@ -20,8 +21,13 @@ from warpedfoam.surfaces.protocol import SIZES
 COINCIDENT, SLIVER, CREASE, EDGES = 1e-9, 5.0, 60.0, 3.0
 #: Shares of a hollow's radius from which on a gap is wide, and edges are too long to know the radius well.
 HOLLOW = 0.3
+#: A rim shorter than so many widths of a bubble is small.
+AROUND = 3.0
 #: What the command line's repair takes care of.
-MENDED, FILLED = "(--repair does)", "(--repair does those of 3 or 4 edges)"
+MENDED = "(--repair does)"
+FILLED = "(--repair does those of 3 or 4 edges, with --close-holes 20 those of up to 20)"
+#: Holes that are always closed, for there is next to nothing to guess.
+SAFE_EDGES = 4
 
 
 @dataclass(frozen=True)
@@ -164,15 +170,23 @@ def mesh_report(mesh: TriangleMesh, *, gap: float | None = None, n_bubbles: int 
     )
 
 
-def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
-    """The mesh after safe repairs, and what was done; shape is not changed.
+def repaired(mesh: TriangleMesh, *, hole_edges: int = SAFE_EDGES) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """The mesh after safe repairs, and what was done; no node is moved.
 
     Merges nodes at the same place (on rims, or joined by an edge), drops doubled triangles, those that
     use a node twice and unused nodes, keeps the largest component, turns triangles the same way round
     and outwards, and closes holes of three or four edges. What needs judgement is left alone.
 
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    hole_edges : int, optional
+        Close holes of up to so many edges, 4 … 64, flat between their nodes: for holes that are damage.
+
     Raises
     ------
+    TypeError, ValueError
+        If an argument is of the wrong type or out of range.
     MeshError
         If nothing is left.
 
@@ -187,6 +201,7 @@ def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     import trimesh
 
     _as_file_mesh(mesh)
+    most = as_integer(hole_edges, "hole_edges", minimum=SAFE_EDGES, maximum=MOST_EDGES)
     if placement_fault(mesh) is not None:
         return mesh, ()
     done: list[str] = []
@@ -228,9 +243,13 @@ def repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     if holes:
         work.fill_holes()
         left = _rim_count(_Edges(TriangleMesh.from_trimesh(work)).rim, len(work.vertices))
-        note("closed {} hole", holes - left)
     kept, tri = np.unique(np.asarray(work.faces), return_inverse=True)
     out = TriangleMesh(mesh.nodes[kept], tri.reshape(-1, 3))
+    if holes:
+        larger = 0
+        if left and most > SAFE_EDGES and _is_surface(out):
+            out, larger = closed_holes(out, most)
+        note("closed {} hole", holes - left + larger)
     if not len(_Edges(out).rim) and _signed_volume(out) < 0.0:
         out = TriangleMesh(out.nodes, out.triangles[:, ::-1])
         done.append("turned the mesh outwards")
@@ -310,6 +329,10 @@ def _pinched(mesh: TriangleMesh) -> list[MeshFinding]:
     return []
 
 
+def _is_surface(mesh: TriangleMesh) -> bool:
+    return not _pinched(mesh)
+
+
 def _signed_volume(mesh: TriangleMesh) -> float:
     """Volume inside a closed mesh, below 0 if it is inside out."""
     a, b, c = (mesh.nodes[mesh.triangles[:, i]] - mesh.nodes.mean(axis=0) for i in range(3))
@@ -334,13 +357,34 @@ def _size_findings(
             "tells whether the plates fold"
         )
         out.append(MeshFinding(f"coarse for gap {gap:g}", 1, "the tightest hollow", advice, False))
-    if count is not None and np.sqrt(mesh.area / count) < EDGES * mesh.mean_edge:
+    size = np.inf if count is None else np.sqrt(mesh.area / count)
+    small = [] if count is None else small_rims(mesh, count)
+    if small:
+        node, around = small[0]
+        advice = (
+            f"it is {around:.3g} round and a bubble {size:.3g} wide: films ending there hardly rest; "
+            f"close it {FILLED}"
+        )
+        where = f"rim at node {node}"
+        out.append(MeshFinding(f"small rim for {count} bubbles", len(small), where, advice, False))
+    if count is not None and size < EDGES * mesh.mean_edge:
         enough = int(np.ceil(EDGES**2 / 0.86 * count))
         advice = (
             f"from about {enough} nodes on, each bubble sees the shape of the surface; a coarser mesh is "
             "smoothed between its nodes, which may be good enough"
         )
         out.append(MeshFinding(f"coarse for {count} bubbles", 1, "everywhere", advice, False))
+    return out
+
+
+def small_rims(mesh: TriangleMesh, n_bubbles: int) -> list[tuple[int, float]]:
+    """First node and length of each rim that has no room for three bubbles of so many; damage, most often."""
+    out = []
+    for loop in mesh.rim_loops:
+        x = mesh.nodes[loop]
+        around = float(np.linalg.norm(x - np.roll(x, 1, axis=0), axis=1).sum())
+        if around < AROUND * np.sqrt(mesh.area / n_bubbles):
+            out.append((int(loop[0]), around))
     return out
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Floats, as_floats, frozen
+from warpedfoam.surfaces.formula import Formula
 from warpedfoam.surfaces.netted import FIRST_LOOK, NettedSurface
 
 #: Step of second derivatives by differences, and largest error of the user's gradient; in sizes, relative.
@@ -17,18 +18,20 @@ STEP, GRADIENT_ERROR = 1e-5, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Implicit(NettedSurface):
-    """Closed surface f = 0 inside a box, from f and its gradient; f grows into the gap.
+    """Closed surface f = 0 inside a box, from f and its gradient or a formula; f grows into the gap.
+
+    Made by `from_formula` its derivatives are exact, and a foam on it can be saved.
 
     Parameters
     ----------
     function : callable
         f at points (n, 3), returning (n,); smooth, at least three times differentiable.
-    gradient : callable
-        ∇f at points (n, 3), returning (n, 3).
+    gradient : callable or None
+        ∇f at points (n, 3), returning (n, 3); None if ``function`` is a `Formula`.
     bounds : (2, 3) array
         Lower and upper corner of a box that holds the surface with room to spare.
     hessian : callable, optional
-        ∇²f, returning (n, 3, 3); central differences of the gradient by default.
+        ∇²f, returning (n, 3, 3); a formula's own, or central differences of the gradient by default.
 
     Raises
     ------
@@ -51,23 +54,32 @@ class Implicit(NettedSurface):
     >>> ring = Implicit(f, grad, [[-4.5, -4.5, -1.5], [4.5, 4.5, 1.5]])
     >>> ring.euler_characteristic, bool(abs(ring.area / (12.0 * np.pi**2) - 1.0) < 1e-5)
     (0, True)
+
+    The same by its formula:
+
+    >>> ring = Implicit.from_formula("(hypot(x, y) - 3)**2 + z**2 - 1", [[-4.5, -4.5, -1.5], [4.5, 4.5, 1.5]])
+    >>> ring.gaussian_curvature([[4.0, 0.0, 0.0]]).round(12).tolist()
+    [0.25]
     """
 
     function: Callable[[Floats], Floats]
-    gradient: Callable[[Floats], Floats]
+    gradient: Callable[[Floats], Floats] | None
     bounds: Floats
     hessian: Callable[[Floats], Floats] | None = None
 
     def __init__(
         self,
         function: Callable[[Floats], Floats],
-        gradient: Callable[[Floats], Floats],
+        gradient: Callable[[Floats], Floats] | None,
         bounds: ArrayLike,
         hessian: Callable[[Floats], Floats] | None = None,
     ) -> None:
+        exact = isinstance(function, Formula)
         for name, item in (("function", function), ("gradient", gradient), ("hessian", hessian)):
-            if not callable(item) and not (name == "hessian" and item is None):
+            if not callable(item) and not (item is None and (name == "hessian" or exact)):
                 raise TypeError(f"{name} must be callable, got {type(item).__name__}")
+        if isinstance(function, Formula) and function.variables != "xyz":
+            raise ValueError(f"function must be a formula of x, y and z, got one of {function.variables}")
         box = as_floats(bounds, "bounds", (2, 3))
         if not (box[0] < box[1]).all():
             raise ValueError("bounds must be two corners, the lower one first, with room between them")
@@ -77,9 +89,15 @@ class Implicit(NettedSurface):
         put(self, "hessian", hessian)
         put(self, "bounds", frozen(box))
         nodes, _ = self.net(float((box[1] - box[0]).max()) / FIRST_LOOK)
-        self._check_gradient(nodes)
+        if gradient is not None:
+            self._check_gradient(nodes)
         if hessian is not None:
             self._check_hessian(hessian, nodes)
+
+    @classmethod
+    def from_formula(cls, formula: str, bounds: ArrayLike) -> Implicit:
+        """The closed surface where a formula of x, y and z is 0, see `Formula`; it grows into the gap."""
+        return cls(Formula(formula), None, bounds)
 
     def _check_gradient(self, points: Floats) -> None:
         h = STEP * self.size
@@ -112,7 +130,9 @@ class Implicit(NettedSurface):
         return as_floats(self.function(points.copy()), "function's values", (len(points),))
 
     def _g(self, points: Floats) -> Floats:
-        return as_floats(self.gradient(points.copy()), "gradient's values", (len(points), 3))
+        slope = self.function.gradient if isinstance(self.function, Formula) else self.gradient
+        assert slope is not None
+        return as_floats(slope(points.copy()), "gradient's values", (len(points), 3))
 
     @property
     def size(self) -> float:
@@ -132,8 +152,11 @@ class Implicit(NettedSurface):
         value, slope = self.values(safe), self._g(safe)
         if not second:
             return value, slope, None
-        if self.hessian is not None:
-            return value, slope, as_floats(self.hessian(safe.copy()), "hessian's values", (len(points), 3, 3))
+        given = self.hessian
+        if given is None and isinstance(self.function, Formula):
+            given = self.function.hessian
+        if given is not None:
+            return value, slope, as_floats(given(safe.copy()), "hessian's values", (len(points), 3, 3))
         h = STEP * self.size
         rows = [(self._g(safe + h * e) - self._g(safe - h * e)) / (2.0 * h) for e in np.eye(3)]
         bend = np.stack(rows, axis=1)

@@ -186,9 +186,8 @@ class LevelSurface(ABC):
     def _shape(self, points: Floats) -> tuple[Floats, Floats]:
         """Normals (n, 3) and shape operators (n, 3, 3) at points of the surface."""
         _, gradient, second = self.level(points, second=True)
-        normal, shape = _normal_shape(gradient, second)
-        assert shape is not None
-        return normal, shape
+        assert second is not None
+        return _normal_shape(gradient, second)
 
     def _shape_slopes(self, points: Floats, normals: Floats) -> Floats:
         """∂_a W along the surface at points (…, 3) of it, (…, 3, 3, 3), by central differences."""
@@ -201,12 +200,12 @@ class LevelSurface(ABC):
 
     def _settled(self, points: Floats, axes: Floats) -> tuple[Floats, Floats, Floats]:
         """Where lines from near points meet the surface, normals and shape operators there."""
-        found, normal, shape = self._landed(points, axes, second=True)
-        assert shape is not None
-        return found, normal, shape
+        found, gradient, second = self._landed(points, axes, second=True)
+        assert second is not None
+        return found, *_normal_shape(gradient, second)
 
     def _landed(self, points: Floats, axes: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
-        """Where lines from near points meet the surface, to about 1e-9; normals and shape operators there.
+        """Where lines from near points meet the surface, to about 1e-9; ∇f and ∇²f there.
 
         A step or two and a look at where they led; only lines that are not there yet go on.
         """
@@ -230,7 +229,7 @@ class LevelSurface(ABC):
                     bend = np.array(bend)
                     bend[late] = again
         # the look's own step costs nothing more
-        return (near - left[:, None] * axes, *_normal_shape(gradient, bend))
+        return near - left[:, None] * axes, gradient, bend
 
     def normals(self, points: ArrayLike) -> Floats:
         """∇f/|∇f| at the projections of the points."""
@@ -438,10 +437,12 @@ class LevelSurface(ABC):
         bent = c1 != 0.0 or c2 != 0.0
 
         def land(points: Floats, axes: Floats) -> tuple[Floats, Floats]:
-            at, normal, shape = self._landed(points, axes, second=bent)
-            if shape is None:
+            at, gradient, second = self._landed(points, axes, second=bent)
+            size = np.linalg.norm(gradient, axis=1)
+            normal = gradient / size[:, None]
+            if second is None:
                 return normal, np.full(len(points), c0)
-            return normal, layer.density(at, *_mean_gauss(shape))
+            return normal, layer.density(at, *_mean_gauss_of(normal, second / size[:, None, None]))
 
         back = (loops.halves & 1).astype(bool)[:, None]
         first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]
@@ -454,16 +455,23 @@ class LevelSurface(ABC):
         return fan_integrals(placed.rule, points, loops, shifts, self.foot, land, self._unit, rays)
 
 
-def _normal_shape(gradient: Floats, second: Floats | None) -> tuple[Floats, Floats | None]:
+def _normal_shape(gradient: Floats, second: Floats) -> tuple[Floats, Floats]:
     """n = ∇f/|∇f| and W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|."""
     size = np.linalg.norm(gradient, axis=1)
     normal = gradient / size[:, None]
-    if second is None:
-        return normal, None
     bent = np.einsum("nxy,ny->nx", second, normal)
     shape = second - normal[:, :, None] * bent[:, None] - bent[:, :, None] * normal[:, None]
     shape += np.einsum("nx,nx->n", normal, bent)[:, None, None] * (normal[:, :, None] * normal[:, None])
     return normal, shape / size[:, None, None]
+
+
+def _mean_gauss_of(normal: Floats, bend: Floats) -> tuple[Floats, Floats]:
+    """H and G from n and B = ∇²f/|∇f|: tr W = tr B − nᵀBn, tr W² = tr B² − 2 |Bn|² + (nᵀBn)²."""
+    bent = np.einsum("nxy,ny->nx", bend, normal)
+    across = np.einsum("nx,nx->n", normal, bent)
+    trace = np.einsum("nxx->n", bend) - across
+    square = np.einsum("nxy,nxy->n", bend, bend) - 2.0 * np.einsum("nx,nx->n", bent, bent) + across**2
+    return 0.5 * trace, 0.5 * (trace**2 - square)
 
 
 def _mean_gauss(shape: Floats) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from warpedfoam.arrays import Bools, Floats, Ints, as_integer, frozen
 from warpedfoam.errors import MeshError
 from warpedfoam.kernels.height_arcs import dots
-from warpedfoam.kernels.jets import Jets, blended, blended_fast, compiled_blend, fit_jets
+from warpedfoam.kernels.jets import Jets, blended, fit_jets
 from warpedfoam.surfaces.files import read_mesh
 from warpedfoam.surfaces.level import LevelSurface, Look
 from warpedfoam.surfaces.mesh import TriangleMesh
@@ -202,11 +202,8 @@ class MeshSurface(LevelSurface):
         return blended(jets, points, nearest, candidates, second=second)
 
     def near(self, points: Floats) -> Look:
-        """The blended jets, the nearest nodes found once where compiled loops can follow them."""
+        """The blended jets, the nearest nodes found once: half a spacing from one its candidates will do."""
         jets, candidates, tree = self._jets
-        blend = compiled_blend(jets)
-        if blend is None:
-            return super().near(points)
         start = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
         nearest = np.asarray(tree.query(start)[1], dtype=np.int64)
 
@@ -217,7 +214,7 @@ class MeshSurface(LevelSurface):
             if far.size:
                 node = node.copy()
                 node[far] = tree.query(np.nan_to_num(places[far], nan=0.0, posinf=0.0, neginf=0.0))[1]
-            return blended_fast(blend, jets, places, node, candidates, second)
+            return blended(jets, places, node, candidates, second=second)
 
         return look
 

@@ -32,6 +32,10 @@ class Places:
         found = self._tree.query(self._inside(points), k=count, workers=-1)
         return np.asarray(found[0]), np.asarray(found[1], dtype=np.int64)
 
+    def count(self, radius: float) -> int:
+        """Number of pairs within ``radius``, found without making them."""
+        return (int(self._tree.count_neighbors(self._tree, radius)) - self._tree.n) // 2
+
     def pairs(self, radius: float) -> Ints:
         """Pairs i < j within ``radius``, (m, 2)."""
         pairs = self._tree.query_pairs(radius, output_type="ndarray")

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from warpedfoam.arrays import Bools, Floats, as_floats, as_integer, as_number
+from warpedfoam.surfaces.formula import Formula
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.netted import NettedSurface
 from warpedfoam.surfaces.turned import turned_mesh, turned_rims
@@ -25,14 +26,14 @@ class Revolution(NettedSurface):
 
     The *square* of the radius is given, since it stays smooth at a pole, where the radius does not:
     a spheroid of semi-axes a, c has s(z) = a² (1 − z²/c²). Where s is 0 at an end there is a pole, where
-    it is above 0 a rim.
+    it is above 0 a rim. Made by `from_formula` its derivatives are exact, and a foam on it can be saved.
 
     Parameters
     ----------
     square : callable
         s at heights (n,), returning (n,): above 0 between the ends; smooth a little beyond them.
-    slope : callable
-        s', the same way.
+    slope : callable or None
+        s', the same way; None if ``square`` is a `Formula`.
     bottom, top : float
         Heights of the ends.
 
@@ -47,17 +48,23 @@ class Revolution(NettedSurface):
     >>> egg = Revolution(lambda z: 4.0 * (1.0 - z**2 / 9.0), lambda z: -8.0 * z / 9.0, -3.0, 3.0)
     >>> egg.gaussian_curvature([[0.0, 0.0, 3.0]]).round(6)
     array([0.5625])
+    >>> egg = Revolution.from_formula("4 * (1 - z**2 / 9)", -3.0, 3.0)
+    >>> egg.gaussian_curvature([[0.0, 0.0, 3.0]]).tolist()
+    [0.5625]
     """
 
     square: Callable[[Floats], Floats]
-    slope: Callable[[Floats], Floats]
+    slope: Callable[[Floats], Floats] | None
     bottom: float
     top: float
 
     def __post_init__(self) -> None:
+        exact = isinstance(self.square, Formula)
         for name in ("square", "slope"):
-            if not callable(getattr(self, name)):
+            if not callable(getattr(self, name)) and not (exact and self.slope is None):
                 raise TypeError(f"{name} must be callable, got {type(getattr(self, name)).__name__}")
+        if isinstance(self.square, Formula) and self.square.variables != "z":
+            raise ValueError(f"square must be a formula of z, got one of {self.square.variables}")
         low, high = as_number(self.bottom, "bottom"), as_number(self.top, "top")
         if not low < high:
             raise ValueError(f"top must lie above bottom, got {high:g} and {low:g}")
@@ -70,7 +77,9 @@ class Revolution(NettedSurface):
             raise ValueError("square must be above 0 between bottom and top, and 0 or above there")
         h = STEP * (high - low)
         given = self._ds(z)
-        off = np.abs((self._s(z + h) - self._s(z - h)) / (2.0 * h) - given)
+        off = np.zeros(len(z))
+        if self.slope is not None:
+            off = np.abs((self._s(z + h) - self._s(z - h)) / (2.0 * h) - given)
         if not (off <= SLOPE_ERROR * np.abs(given).max()).all():
             bad = int(off.argmax())
             raise ValueError(
@@ -80,11 +89,25 @@ class Revolution(NettedSurface):
         if (low_pole and not given[0] > 0.0) or (high_pole and not given[-1] < 0.0):
             raise ValueError("slope must be above 0 at bottom and below 0 at top: a pole must be round")
 
+    @classmethod
+    def from_formula(cls, formula: str, bottom: float, top: float) -> Revolution:
+        """x² + y² is a formula of z, see `Formula`."""
+        return cls(Formula(formula, "z"), None, bottom, top)
+
     def _s(self, z: Floats) -> Floats:
         return as_floats(self.square(z.copy()), "square's values", (len(z),))
 
     def _ds(self, z: Floats) -> Floats:
-        return as_floats(self.slope(z.copy()), "slope's values", (len(z),))
+        slope = self.square.gradient if isinstance(self.square, Formula) else self.slope
+        assert slope is not None
+        return as_floats(slope(z.copy()), "slope's values", (len(z),))
+
+    def _dds(self, z: Floats) -> Floats:
+        if isinstance(self.square, Formula):
+            return as_floats(self.square.hessian(z.copy()), "square's derivatives", (len(z),))
+        h = STEP * (self.top - self.bottom)
+        out: Floats = (self._ds(z + h) - self._ds(z - h)) / (2.0 * h)
+        return out
 
     @cached_property
     def _poles(self) -> tuple[bool, bool]:
@@ -123,10 +146,9 @@ class Revolution(NettedSurface):
         gradient = np.stack([2.0 * points[:, 0], 2.0 * points[:, 1], -slope], axis=1)
         if not second:
             return value, gradient, None
-        h = STEP * (self.top - self.bottom)
         bend = np.zeros((len(points), 3, 3))
         bend[:, 0, 0] = bend[:, 1, 1] = 2.0
-        bend[:, 2, 2] = -(self._ds(held + h) - self._ds(held - h)) / (2.0 * h)
+        bend[:, 2, 2] = -self._dds(held)
         return value, gradient, bend
 
     def _radius(self, z: Floats) -> Floats:

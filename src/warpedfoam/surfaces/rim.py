@@ -147,15 +147,19 @@ class Rim:
         loop = self._loop[side]
         # a spline that is not quite on the surface: the place whose landing is nearest, or points would creep
         for _ in range(2):
-            away = points - self.at(loop, u)
-            tangent, _, speed = self.frame(loop, u)
+            there = self.at(loop, u)
+            away = points - there
+            tangent, _, speed = self._frame(loop, u, there)
             u = u + np.einsum("ni,ni->n", away, tangent) / speed
         return loop, u
 
     def frame(self, loop: Ints, u: Floats) -> tuple[Floats, Floats, Floats]:
         """Unit tangents T (n, 3), unit conormals n × T into the surface (n, 3), and speeds |x'| (n,)."""
+        return self._frame(loop, u, self.at(loop, u))
+
+    def _frame(self, loop: Ints, u: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
         slope = self._derivative("slope", loop, u)
-        normal = self._unit(self.at(loop, u))
+        normal = self._unit(points)
         slope -= np.einsum("ni,ni->n", slope, normal)[:, None] * normal
         speed = np.linalg.norm(slope, axis=1)
         tangent = slope / speed[:, None]
@@ -181,8 +185,8 @@ class Rim:
     def beyond(self, points: Floats) -> Bools:
         """Whether points lie on the far side of the rim's curtain of normals at its nearest point."""
         loop, u = self.locate(points)
-        away = points - self.at(loop, u)
-        out: Bools = np.einsum("ni,ni->n", away, self.frame(loop, u)[1]) < 0.0
+        there = self.at(loop, u)
+        out: Bools = np.einsum("ni,ni->n", points - there, self._frame(loop, u, there)[1]) < 0.0
         return out
 
     def spans(self, start: Floats, end: Floats) -> tuple[Ints, Floats, Floats]:
@@ -264,12 +268,13 @@ class Rim:
         """Points along the whole rim (n, 3), conormals there (n, 3) and the lengths they stand for (n,)."""
         loop = self._loop[self._owner]
         u = self._places
-        _, across, speed = self.frame(loop, u)
+        points = self.at(loop, u)
+        _, across, speed = self._frame(loop, u, points)
         share = np.zeros(len(u))
         for k, side in enumerate(self._sides):
             here = self._owner == k
             share[here] = (side.last - side.first) / here.sum()
-        return self.at(loop, u), across, share * speed
+        return points, across, share * speed
 
 
 def _fitted(loop: int, points: Floats, start: float, *, closed: bool) -> _Side:

@@ -12,16 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from warpedfoam.arrays import as_choice
+from warpedfoam.arrays import Floats, as_choice
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 from warpedfoam.io.colours import CHARGE_RANGE, FILM_COLOUR, OUTSIDE_COLOUR
+from warpedfoam.view.chunks import Chunks, in_chunks, parts_of_bubbles
 from warpedfoam.view.frames import bounding_cube, frame_arrays, packed
 from warpedfoam.view.geometry import Geometry, detail, geometry
 from warpedfoam.view.scalars import SCALARS, Scalar, bubble_scalars
 
-# Surfaces that are called after somebody.
-_PROPER = {"SchwarzP": "Schwarz P surface"}
+# Surfaces that are called otherwise than their classes.
+_PROPER = {"SchwarzP": "Schwarz P surface", "Graph": "landscape", "Revolution": "surface of revolution"}
 #: Version of the data in the page; its scripts are written beside it and fit.
 VERSION = 1
 SUFFIXES = (".html", ".htm")
@@ -29,8 +30,11 @@ SCRIPTS = ("maths.js", "frames.js", "shaders.js", "painter.js", "gestures.js", "
 # Films are pulled towards the eye, so that they do not flicker in the patches that they bound: by this many
 # bubble sizes, at most this share of the picture.
 _PULL, _MOST_PULL = 0.02, 0.004
-# More bubbles than these are also kept in fewer triangles: so many segments a film and rings a bubble.
+# Segments a film and rings a bubble of coarser meshes, beside the finest: with more triangles than these, and
+# with more bubbles than these.
+_BUSY, _MEDIUM = 30_000, (4, 2)
 _MANY, _COARSE = 300, (2, 1)
+_VERY_MANY, _COARSEST = 1000, (1, 1)
 
 
 def write_view(
@@ -55,7 +59,8 @@ def write_view(
         frame; a picked bubble is followed by its id, and colours mean the same values in all frames.
     color_by : str, optional
         What to show first: ``"charge"``, ``"sides"``, ``"area"``, ``"volume"``, ``"pressure"``,
-        ``"curvature"`` (Gaussian, mean of each bubble), ``"surface"`` (Gaussian, point by point) or ``"id"``.
+        ``"curvature"`` (Gaussian, mean of each bubble), ``"surface"`` (Gaussian, point by point),
+        ``"gap"`` where it varies, or ``"id"``.
     title : str, optional
         In place of the number of bubbles and the surface.
     labels : sequence of str, optional
@@ -72,7 +77,8 @@ def write_view(
         If ``foams`` holds anything but foams, or texts are no strings.
     ValueError
         If there is no foam, the path has another ending, ``color_by`` is unknown or asks for pressures that
-        some foam does not have, or there are not as many labels as foams.
+        some foam does not have or a gap that varies where none does, or there are not as many labels as
+        foams.
     FileNotFoundError, IsADirectoryError
         If the path cannot be written.
 
@@ -102,6 +108,10 @@ def write_view(
         raise ValueError(
             "color_by='pressure' needs pressures in every foam: relax them first (warpedfoam.relax)"
         )
+    if name == "gap" and all(foam.cell.parallel for foam in frames):
+        raise ValueError(
+            "color_by='gap' needs plates that are not parallel: here the gap is the same everywhere"
+        )
     words = _words(labels, len(frames))
     if title is not None and not isinstance(title, str):
         raise TypeError(f"title must be a string or None, got {type(title).__name__}")
@@ -109,9 +119,10 @@ def write_view(
         if not text.isprintable() and any("\ud800" <= letter <= "\udfff" for letter in text):
             raise ValueError(f"title and labels must be text that UTF-8 can hold, got {text!r}")
     segments, rings = detail(max(foam.n_bubbles for foam in frames), len(frames))
-    drawn = [_meshes(foam, segments, rings) for foam in frames]
-    scalars = bubble_scalars(frames, [meshes[0].curvature for meshes in drawn])
-    cube = bounding_cube([mesh for meshes in drawn for mesh in meshes])
+    levels = [_levels(foam, segments, rings) for foam in frames]
+    drawn = [_meshes(foam, sizes) for foam, sizes in zip(frames, levels, strict=True)]
+    scalars = bubble_scalars(frames, [meshes[0][0].curvature for meshes in drawn])
+    cube = bounding_cube([mesh for meshes in drawn for mesh, _ in meshes])
     layouts, texts = [], []
     for number, (foam, meshes) in enumerate(zip(frames, drawn, strict=True)):
         layout, text = packed(frame_arrays(foam, meshes, scalars, number, cube))
@@ -122,12 +133,18 @@ def write_view(
         "title": _heading(frames) if title is None else title,
         "colorBy": name,
         "cube": {"low": cube[0].tolist(), "side": cube[1]},
-        "view": _first_view(frames[0], drawn[0][0]),
+        "view": _first_view(frames[0], drawn[0][0][0]),
         "colours": {"film": FILM_COLOUR, "outside": OUTSIDE_COLOUR, "chargeRange": CHARGE_RANGE},
         "scalars": [_described(scalar) for scalar in scalars],
         "frames": [
-            _frame_facts(foam, meshes, layout, word, cube[1])
-            for foam, meshes, layout, word in zip(frames, drawn, layouts, words, strict=True)
+            {
+                **_frame_facts(foam, meshes, cube[1]),
+                "label": word,
+                # of each film, mesh by mesh
+                "pieces": [pieces for pieces, _ in sizes],
+                "layout": layout,
+            }
+            for foam, meshes, sizes, layout, word in zip(frames, drawn, levels, layouts, words, strict=True)
         ],
     }
     text = page(facts, texts)
@@ -170,10 +187,22 @@ def _frames(foams: object) -> tuple[Foam, ...]:
     return tuple(foams)
 
 
-def _meshes(foam: Foam, segments: int, rings: int) -> list[Geometry]:
-    """The foam as it is drawn, and more coarsely for when its many bubbles are small in the window."""
-    fine = geometry(foam, segments, rings)
-    return [fine] if foam.n_bubbles <= _MANY else [fine, geometry(foam, *_COARSE)]
+def _levels(foam: Foam, segments: int, rings: int) -> list[tuple[int, int]]:
+    """Segments a film and rings a bubble as it is drawn, and for small bubbles or moving pictures."""
+    triangles = 2 * foam.network.n_films * segments * (2 * rings - 1)
+    if foam.n_bubbles > _VERY_MANY:
+        return [(segments, rings), _COARSE, _COARSEST]
+    if foam.n_bubbles > _MANY:
+        return [(segments, rings), _COARSE]
+    return [(segments, rings), _MEDIUM] if triangles > _BUSY else [(segments, rings)]
+
+
+def _meshes(foam: Foam, levels: Sequence[tuple[int, int]]) -> list[tuple[Geometry, Chunks]]:
+    """The foam in each degree of detail, in parts that are drawn or left out as one."""
+    centres = foam.bubble_centres
+    normals = foam.cell.surface.normals(centres)
+    part = parts_of_bubbles(centres, normals, foam.network.bubble_euler == 1)
+    return [in_chunks(geometry(foam, segments, rings), part) for segments, rings in levels]
 
 
 def _words(labels: object, count: int) -> list[str]:
@@ -200,6 +229,10 @@ def _heading(foams: Sequence[Foam]) -> str:
 def _held(foam: Foam) -> int:
     """Number of bubbles, an exterior not counted."""
     return foam.n_bubbles - (foam.exterior is not None)
+
+
+def _least_and_most(values: Sequence[float] | Floats) -> list[float]:
+    return [float(min(values)), float(max(values))]
 
 
 def _first_view(foam: Foam, drawn: Geometry) -> dict[str, float]:
@@ -230,21 +263,19 @@ def _described(scalar: Scalar) -> dict[str, Any]:
     }
 
 
-def _frame_facts(
-    foam: Foam, meshes: Sequence[Geometry], layout: list[list[Any]], label: str, side: float
-) -> dict[str, Any]:
+def _frame_facts(foam: Foam, meshes: Sequence[tuple[Geometry, Chunks]], side: float) -> dict[str, Any]:
     surface = foam.cell.surface
     return {
-        "label": label,
         "bubbles": foam.n_bubbles,
         "held": _held(foam),
         "energy": foam.energy,
-        "gap": foam.cell.mean_gap,
+        "gap": _least_and_most(
+            [foam.cell.mean_gap] if foam.cell.parallel else foam.cell.gaps(meshes[0][0].points)
+        ),
         "size": foam.bubble_size,
         "pull": min(_PULL * foam.bubble_size, _MOST_PULL * side),
-        "sink": max(float(mesh.sunk.max()) for mesh in meshes),
+        "sink": max(float(mesh.sunk.max()) for mesh, _ in meshes),
         "meshes": len(meshes),
         # of a surface with edges in the picture the back is seen too
         "edged": surface.period is not None or surface.rim is not None,
-        "layout": layout,
     }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpedfoam.arrays import Floats, Ints
 from warpedfoam.foam import Foam
+from warpedfoam.view.chunks import Chunks
 from warpedfoam.view.geometry import Geometry
 from warpedfoam.view.scalars import Scalar
 
@@ -34,7 +35,7 @@ def bounding_cube(meshes: Sequence[Geometry]) -> tuple[Floats, float]:
 
 def frame_arrays(
     foam: Foam,
-    meshes: Sequence[Geometry],
+    meshes: Sequence[tuple[Geometry, Chunks]],
     scalars: Sequence[Scalar],
     frame: int,
     cube: tuple[Floats, float],
@@ -58,8 +59,9 @@ def frame_arrays(
         if scalar.name != "surface":
             arrays[f"rgb:{scalar.name}"] = scalar.rgb[frame]
     (curvature,) = (s for s in scalars if s.name == "surface")
-    for number, mesh in enumerate(meshes):
-        for name, array in _mesh_arrays(mesh, curvature.limits, cube).items():
+    for number, (mesh, chunks) in enumerate(meshes):
+        found = _mesh_arrays(mesh, curvature.limits, cube) | _chunk_arrays(chunks)
+        for name, array in found.items():
             arrays[f"mesh{number}:{name}"] = array
     return arrays
 
@@ -81,6 +83,15 @@ def _mesh_arrays(
         "line_normals": _directions(mesh.line_normals, np.zeros(n_lines, dtype=bool)),
         "segments": _steps(mesh.segments.T),
         "beside": _steps(mesh.beside.T),
+    }
+
+
+def _chunk_arrays(chunks: Chunks) -> dict[str, NDArray[Any]]:
+    return {
+        "chunk_triangles": chunks.triangles.astype(np.int32),
+        "chunk_segments": chunks.segments.astype(np.int32),
+        "chunk_balls": chunks.balls,
+        "chunk_cones": chunks.cones,
     }
 
 

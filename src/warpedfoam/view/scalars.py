@@ -21,16 +21,17 @@ from warpedfoam.io.colours import (
     ramp_rgb,
 )
 
-#: Names of the scalars; ``surface`` is the Gaussian curvature point by point.
-SCALARS = ("charge", "sides", "area", "volume", "pressure", "curvature", "surface", "id")
+#: Names of the scalars; ``surface`` is the Gaussian curvature point by point, ``gap`` is there if one varies.
+SCALARS = ("charge", "sides", "area", "volume", "pressure", "curvature", "surface", "gap", "id")
 _LABELS = {
     "charge": "charge q = 6 − n",
     "sides": "sides n",
     "area": "area of the bubble",
     "volume": "volume of the bubble",
     "pressure": "pressure",
-    "curvature": "Gaussian curvature, mean of the bubble",
-    "surface": "Gaussian curvature of the surface",
+    "curvature": "Gaussian curvature, mean",
+    "surface": "Gaussian curvature, pointwise",
+    "gap": "gap at the centre",
     "id": "id of the bubble",
 }
 
@@ -91,6 +92,8 @@ def bubble_scalars(foams: Sequence[Foam], curvatures: Sequence[Floats]) -> tuple
     low = min(float(g.min()) for g in curvatures)
     high = max(float(g.max()) for g in curvatures)
     found += _curvature(foams, inside, disks, (low, high))
+    if any(not foam.cell.parallel for foam in foams):
+        found.append(_ramp("gap", foams, inside, lambda foam: foam.cell.gaps(foam.bubble_centres), disks))
     found.append(_ramp("id", foams, inside, lambda foam: foam.bubble_ids.astype(np.float64)))
     return tuple(found)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_choice
 from warpedfoam.plot.maps.discs import Discs
+from warpedfoam.plot.maps.plate import Plate
 from warpedfoam.plot.maps.sheets import Axis, flat_sheet, globe_sheet, torus_sheet, turned_sheet
 from warpedfoam.plot.maps.strands import Strands
 from warpedfoam.surfaces import Catenoid, Cylinder, FlatTorus, Graph, Revolution, Sphere, Surface, Torus
@@ -82,7 +83,7 @@ def projections(surface: Surface) -> tuple[str, ...]:
     if isinstance(surface, Revolution):
         return TURNED if surface.euler_characteristic == 0 else TURNED[:2]
     if isinstance(surface, FlatTorus | Graph):
-        return () if isinstance(surface, Graph) and surface.disk else PLANE
+        return PLANE
     if isinstance(surface, Sphere) or (surface.euler_characteristic == 2 and _is_star(surface)):
         return GLOBE
     return ()
@@ -99,14 +100,17 @@ def chart_of(surface: Surface, projection: str | None, centre: tuple[float, floa
     names = projections(surface)
     if not names:
         raise ValueError(
-            f"a {type(surface).__name__} cannot be unrolled into a map; draw it with plot_foam instead"
+            f"{_called(surface)} cannot be unrolled into a map without a choice of cuts; draw the foam on "
+            "it with plot_foam or plot_foam_3d, or turn it in a browser: write_view, warpedfoam view"
         )
     name = names[0] if projection is None else as_choice(projection, "projection", names)
     if names == PLANE:
         assert isinstance(surface, FlatTorus | Graph)
         if centre is not None:
             raise ValueError("centre is for maps of angles; a plane map has none")
-        return flat_sheet(surface)
+        return (
+            Plate(0.5 * surface.width) if isinstance(surface, Graph) and surface.disk else flat_sheet(surface)
+        )
     if names is GLOBE:
         middle = (0.0, 0.0) if centre is None else centre
         radius = surface.radius if isinstance(surface, Sphere) else 1.0
@@ -119,6 +123,11 @@ def chart_of(surface: Surface, projection: str | None, centre: tuple[float, floa
         return torus_sheet(name, surface, (0.0, 90.0) if centre is None else centre)
     assert isinstance(surface, Cylinder | Catenoid | Revolution)
     return turned_sheet(name, surface, 0.0 if centre is None else centre[0])
+
+
+def _called(surface: Surface) -> str:
+    name = type(surface).__name__
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
 def _is_star(surface: Surface) -> bool:

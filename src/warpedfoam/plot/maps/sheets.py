@@ -303,6 +303,13 @@ def turned_sheet(name: str, surface: Cylinder | Catenoid | Revolution, centre: f
     )  # fmt: skip
 
 
+def axis_of_lengths(name: str, side: float) -> Axis:
+    """Round numbers from −side/2 to side/2."""
+    step = _round_step(side / 5.0)
+    ticks = step * np.arange(np.ceil(-0.5 * side / step - 1e-9), np.floor(0.5 * side / step + 1e-9) + 1.0)
+    return Axis(name, ticks, tuple(f"{t:g}".replace("-", "−") for t in ticks))
+
+
 def flat_sheet(surface: FlatTorus | Graph) -> Sheet:
     """The rectangle seen from above."""
     sides = np.array([surface.width, surface.height])
@@ -314,11 +321,7 @@ def flat_sheet(surface: FlatTorus | Graph) -> Sheet:
     def flattened(at: Floats) -> Floats:
         return at
 
-    marks = []
-    for side, name in zip(sides, "xy", strict=True):
-        step = _round_step(side / 5.0)
-        ticks = step * np.arange(np.ceil(-0.5 * side / step - 1e-9), np.floor(0.5 * side / step + 1e-9) + 1.0)
-        marks.append(Axis(name, ticks, tuple(f"{t:g}".replace("-", "−") for t in ticks)))
+    marks = [axis_of_lengths(name, float(side)) for side, name in zip(sides, "xy", strict=True)]
     flat = isinstance(surface, FlatTorus)
     note = "to scale" if flat else "seen from above: slopes are foreshortened"
     if periodic:

@@ -71,19 +71,23 @@ function quads(count) {
   return out;
 }
 
-/** Points, triangles and line pieces of one degree of detail. */
-function meshFrom(raw) {
-  const segments = summed(raw.segments, 2);
-  return {
-    points: raw.points,
-    normals: raw.normals,
-    owner: new Uint32Array(summed(raw.owner, 1)),
-    triangles: woven(summed(raw.triangles, 3), 3, Uint32Array),
-    linePoints: fourfold(ends(raw.line_points, segments, 4, Uint16Array), 8, Uint16Array),
-    lineNormals: fourfold(ends(raw.line_normals, segments, 4, Int8Array), 8, Int8Array),
-    beside: fourfold(woven(summed(raw.beside, 2), 2, Int32Array), 2, Int32Array),
-    quads: quads(segments.length / 2),
-  };
+/** Points, triangles and line pieces of one degree of detail; made when they are first asked for. */
+class Mesh {
+  constructor(raw) {
+    this.raw = raw;
+    this.points = raw.points;
+    this.normals = raw.normals;
+    this.chunks = { triangles: raw.chunk_triangles, segments: raw.chunk_segments, balls: raw.chunk_balls, cones: raw.chunk_cones };
+  }
+
+  get owner() { return (this.kept_owner ??= new Uint32Array(summed(this.raw.owner, 1))); }
+  get triangles() { return (this.kept_triangles ??= woven(summed(this.raw.triangles, 3), 3, Uint32Array)); }
+  get segments() { return (this.kept_segments ??= summed(this.raw.segments, 2)); }
+  // of the four corners of the quad that is drawn of a piece; read once, by the graphics card
+  get linePoints() { return fourfold(ends(this.raw.line_points, this.segments, 4, Uint16Array), 8, Uint16Array); }
+  get lineNormals() { return fourfold(ends(this.raw.line_normals, this.segments, 4, Int8Array), 8, Int8Array); }
+  get beside() { return fourfold(woven(summed(this.raw.beside, 2), 2, Int32Array), 2, Int32Array); }
+  get quads() { return quads(this.segments.length / 2); }
 }
 
 /** A frame ready to be drawn and read, from its unpacked bytes. */
@@ -98,7 +102,7 @@ function frameFrom(buffer, facts) {
     facts,
     ids: raw.ids,
     count: facts.bubbles,
-    meshes: parts.map(meshFrom), // finest first
+    meshes: parts.map((part) => new Mesh(part)), // finest first
     neighbours: neighboursOf(summed(raw.pairs, 2), facts.bubbles),
     euler: raw.euler,
     targets: raw.targets,

@@ -97,15 +97,12 @@ function listen(canvas, camera, { changed, tapped, ended }) {
   canvas.addEventListener("pointerup", release);
   canvas.addEventListener("pointercancel", release);
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  let pause = 0;
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     const { width, height } = box(), lines = [1, 16, height][event.deltaMode] ?? 1;
     const way = Math.min(Math.max(event.deltaY * lines, -240), 240);
     camera.zoomBy(Math.exp(-0.0016 * way * (event.ctrlKey ? 4 : 1)), ...fromMiddle(event.clientX, event.clientY), width, height);
     changed();
-    clearTimeout(pause);
-    pause = setTimeout(ended, 200);
   }, { passive: false });
 
   const STEP = 40, WAYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -119,6 +116,5 @@ function listen(canvas, camera, { changed, tapped, ended }) {
     else return;
     event.preventDefault();
     changed();
-    ended();
   });
 }

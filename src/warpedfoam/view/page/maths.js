@@ -74,6 +74,33 @@ function projected(camera, width, height, point) {
 const pixelSize = (camera, width, height) =>
   (2 * Math.tan(FIELD / 2) * eyeDistance(camera.radius)) / (camera.zoom * Math.min(width, height));
 
+/**
+ * Runs [first, last) of the parts of a mesh that may be seen in a share of a window: [left, right, bottom, top]
+ * from -1 to 1. Parts that face away are left out if the surface is closed.
+ */
+function partsInSight(camera, width, height, { balls, cones }, closed, [left, right, bottom, top]) {
+  const { eye, across, upright } = lens(camera, width, height), [rightward, up, towards] = camera.axes;
+  // sides of the view: a ball is beyond one if side . (x or y, depth) exceeds its radius
+  const sides = [[0, right * across, 1], [0, left * across, -1], [1, top * upright, 1], [1, bottom * upright, -1]]
+    .map(([axis, slope, sign]) => [axis, slope, sign, Math.hypot(1, slope)]);
+  const runs = [];
+  for (let k = 0; k < balls.length / 4; k++) {
+    const arm = [balls[4 * k] - eye[0], balls[4 * k + 1] - eye[1], balls[4 * k + 2] - eye[2]], radius = balls[4 * k + 3];
+    const place = [dot(arm, rightward), dot(arm, up)], depth = -dot(arm, towards);
+    if (depth < -radius) continue;
+    if (sides.some(([axis, slope, sign, size]) => sign * (place[axis] - slope * depth) > radius * size)) continue;
+    if (closed) {
+      const far = Math.hypot(...arm), spread = Math.acos(Math.max(cones[4 * k + 3], -1)) + Math.asin(Math.min(radius / far, 1));
+      const cosine = -(cones[4 * k] * arm[0] + cones[4 * k + 1] * arm[1] + cones[4 * k + 2] * arm[2]) / far;
+      if (spread < Math.PI / 2 && cosine < -Math.sin(spread)) continue;
+    }
+    const last = runs[runs.length - 1];
+    if (last && last[1] === k) last[1] = k + 1;
+    else runs.push([k, k + 1]);
+  }
+  return runs;
+}
+
 /** Axes turned the shortest way until "towards" points along a unit vector. */
 function facing(axes, direction) {
   const axis = cross(axes[2], direction), s = Math.hypot(...axis), c = dot(axes[2], direction);
@@ -81,6 +108,12 @@ function facing(axes, direction) {
   const own = axes.map((a) => dot(a, axis) / s);
   return turnedAxes(axes, own, Math.atan2(s, c));
 }
+
+/** A number of a colour bar, with four digits. */
+const brief = (x) => written(Number(x.toPrecision(4)));
+
+/** A value, or two and what is between them. */
+const between = (low, high) => (low === high ? written(low) : `${brief(low)} to ${brief(high)}`);
 
 /** A number for a reader, with six digits. */
 function written(x) {

@@ -1,5 +1,8 @@
 // WebGL: patches as triangles, films as quads of constant width, bubbles' numbers for picking.
-const SMALL = 44; // dots across a bubble, below which a coarser mesh looks the same
+// Dots across a bubble below which films of two pieces look as bent as they are; and while all of it moves.
+const SMALL = 44, SMALL_MOVING = 110;
+const SAMPLES = 4; // a dot, at rest
+const WHOLE = [-1, 1, -1, 1];
 
 /** Colours of 256 places along a colour bar. */
 function rampTexels(stops) {
@@ -16,16 +19,18 @@ class Painter {
   /** Throws if the browser has no WebGL 2. */
   constructor(canvas) {
     this.canvas = canvas;
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, stencil: false });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, stencil: false });
     if (!gl) throw new Error("This browser has no WebGL 2, which the viewer draws with.");
     this.gl = gl;
     this.patch = this.program(PATCH_VERTEX, PATCH_FRAGMENT);
+    this.numbers = this.program(PATCH_VERTEX, PICK_FRAGMENT);
     this.line = this.program(LINE_VERTEX, LINE_FRAGMENT);
     this.bubbles = this.texture(gl.NEAREST);
     this.ramp = this.texture(gl.LINEAR);
     this.buffers = [];
     this.meshes = [];
-    this.picking = null;
+    this.stores = {};
+    this.counts = null;
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
   }
@@ -74,14 +79,14 @@ class Painter {
     else gl.vertexAttribPointer(place, size, type, true, stride, offset);
   }
 
-  /** Bring a frame's points to the graphics card, in place of the last one's. */
+  /** Show another frame in place of the last one. */
   setFrame(frame) {
     const gl = this.gl;
     for (const buffer of this.buffers) gl.deleteBuffer(buffer);
     this.buffers = [];
-    for (const mesh of this.meshes) [mesh.patches, mesh.lines].forEach((array) => gl.deleteVertexArray(array));
+    for (const mesh of this.meshes) if (mesh) [mesh.patches, mesh.lines].forEach((array) => gl.deleteVertexArray(array));
     this.frame = frame;
-    this.meshes = frame.meshes.map((mesh) => this.uploaded(mesh));
+    this.meshes = frame.meshes.map(() => null); // uploaded when they are first drawn
   }
 
   uploaded(mesh) {
@@ -105,13 +110,35 @@ class Painter {
     this.attribute(4, 2, gl.INT);
     this.buffer(mesh.quads, gl.ELEMENT_ARRAY_BUFFER);
     gl.bindVertexArray(null);
-    return { patches, lines, corners: mesh.triangles.length, ends: mesh.quads.length };
+    return { patches, lines, chunks: mesh.chunks };
   }
 
-  /** The finest mesh, or the coarsest where bubbles are small in the window. */
-  mesh(camera) {
-    const { width, height } = this.canvas, small = this.frame.facts.size / pixelSize(camera, width, height) < SMALL;
-    return this.meshes[small ? this.meshes.length - 1 : 0];
+  /** Number of the coarsest mesh that looks as the finest does, or nearly so while the picture moves. */
+  level(camera, moving) {
+    const { width, height } = this.canvas, { size, pieces } = this.frame.facts;
+    const dots = size / pixelSize(camera, width, height), small = moving ? SMALL_MOVING : SMALL;
+    // films bend away from their pieces by the square of these
+    for (let k = pieces.length - 1; k > 0; k--) if (dots < small * (pieces[k] / 2) ** 2) return k;
+    return 0;
+  }
+
+  /** What of a mesh may be in sight, in a share of the window. */
+  sight(camera, moving, share = WHOLE) {
+    const { width, height } = this.canvas, level = this.level(camera, moving);
+    const mesh = (this.meshes[level] ??= this.uploaded(this.frame.meshes[level]));
+    const runs = partsInSight(camera, width, height, mesh.chunks, !this.frame.facts.edged, share);
+    return { level, mesh, runs };
+  }
+
+  /** Draw the parts of the mesh that is bound, by where each starts; how many triangles these are. */
+  parts(runs, starts, triangles) {
+    let count = 0;
+    for (const [first, last] of runs) {
+      const start = triangles * starts[first], end = triangles * starts[last];
+      if (end > start) this.gl.drawElements(this.gl.TRIANGLES, 3 * (end - start), this.gl.UNSIGNED_INT, 12 * start);
+      count += end - start;
+    }
+    return count;
   }
 
   /** Colours (n × 3 bytes) and flags (n bytes) of the bubbles. */
@@ -151,25 +178,25 @@ class Painter {
     return uniforms;
   }
 
-  patches(camera, look, mode) {
-    const gl = this.gl, u = this.begin(this.patch, camera, look.cube);
+  patches(which, camera, look, { mesh, runs }) {
+    const gl = this.gl, u = this.begin(which, camera, look.cube);
     const light = unit([-0.35, 0.55, 0.76]);
     gl.uniform1f(u.sink, this.frame.facts.sink);
     gl.uniform3fv(u.light, [0, 1, 2].map((k) => light.reduce((sum, x, j) => sum + x * camera.axes[j][k], 0)));
-    gl.uniform1i(u.mode, mode);
+    gl.uniform1i(u.by_point, look.byPoint);
     gl.uniform1i(u.charged, look.charged);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, this.ramp);
     gl.uniform1i(u.ramp, 1);
-    const mesh = this.mesh(camera);
     gl.bindVertexArray(mesh.patches);
     // of a closed surface no back is seen
     if (!this.frame.facts.edged) gl.enable(gl.CULL_FACE);
-    gl.drawElements(gl.TRIANGLES, mesh.corners, gl.UNSIGNED_INT, 0);
+    const count = this.parts(runs, mesh.chunks.triangles, 1);
     gl.disable(gl.CULL_FACE);
+    return count;
   }
 
-  lines(camera, look) {
+  lines(camera, look, { mesh, runs }, smooth) {
     const gl = this.gl, u = this.begin(this.line, camera, look.cube), { facts } = this.frame;
     const { width, height } = this.canvas, pixel = pixelSize(camera, width, height);
     gl.uniform2f(u.half, 0.5 * width, 0.5 * height);
@@ -181,39 +208,56 @@ class Painter {
     gl.uniform1i(u.charged, look.charged);
     gl.uniform3fv(u.film, look.film);
     gl.uniform3fv(u.accent, look.accent);
-    const mesh = this.mesh(camera);
     gl.bindVertexArray(mesh.lines);
-    gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
-    gl.drawElements(gl.TRIANGLES, mesh.ends, gl.UNSIGNED_INT, 0);
-    gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE);
+    gl.enable(smooth ? gl.SAMPLE_ALPHA_TO_COVERAGE : gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(smooth); // the blended ends of pieces must not hide each other
+    const count = this.parts(runs, mesh.chunks.segments, 2);
+    gl.depthMask(true);
+    gl.disable(smooth ? gl.SAMPLE_ALPHA_TO_COVERAGE : gl.BLEND);
+    return count;
   }
 
-  draw(camera, look) {
-    const gl = this.gl;
+  /** Draw the foam; while it moves in fewer triangles, and with no smoothing of edges but the films'. */
+  draw(camera, look, moving = false) {
+    const gl = this.gl, { width, height } = this.canvas;
     if (!this.frame || gl.isContextLost()) return;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, this.canvas.width, this.canvas.height);
+    const smooth = !moving, store = smooth ? this.store("smooth", SAMPLES) : null;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, store);
+    gl.viewport(0, 0, width, height);
     gl.clearColor(...look.ground, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    this.patches(camera, look, look.mode);
-    this.lines(camera, look);
+    const sight = this.sight(camera, moving);
+    const triangles = this.patches(this.patch, camera, look, sight);
+    const films = this.lines(camera, look, sight, smooth);
     gl.bindVertexArray(null);
+    if (smooth) {
+      // by way of one with a sample a dot: canvases differ in their formats, which samples must not
+      const plain = this.store("plain", 0);
+      for (const [from, to] of [[store, plain], [plain, null]]) {
+        gl.bindFramebuffer(gl.READ_FRAMEBUFFER, from);
+        gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, to);
+        gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+      }
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    }
+    this.counts = { level: sight.level, triangles, films, smooth, parts: sight.runs.length, width, height };
   }
 
   /** Place of the bubble at a share of the window from its top left, or -1. */
   pick(camera, look, x, y) {
     const gl = this.gl, { width, height } = this.canvas;
     if (!this.frame || gl.isContextLost()) return -1;
-    if (!this.picking || this.picking.width !== width || this.picking.height !== height) this.pickingBuffers(width, height);
     const px = Math.min(Math.max(Math.floor(x * width), 0), width - 1);
     const py = Math.min(Math.max(Math.floor((1 - y) * height), 0), height - 1);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.picking.frame);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.store("plain", 0));
     gl.viewport(0, 0, width, height);
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(px, py, 1, 1);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    this.patches(camera, look, 2);
+    const share = [px / width, (px + 1) / width, py / height, (py + 1) / height].map((at) => 2 * at - 1);
+    this.patches(this.numbers, camera, look, this.sight(camera, false, share));
     const texel = new Uint8Array(4);
     gl.readPixels(px, py, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, texel);
     gl.disable(gl.SCISSOR_TEST);
@@ -222,22 +266,25 @@ class Painter {
     return texel[0] + 256 * texel[1] + 65536 * texel[2] - 1;
   }
 
-  pickingBuffers(width, height) {
-    const gl = this.gl;
-    if (this.picking) {
-      gl.deleteFramebuffer(this.picking.frame);
-      this.picking.stores.forEach((store) => gl.deleteRenderbuffer(store));
+  /** A frame buffer of the canvas's size, by its name. */
+  store(name, samples) {
+    const gl = this.gl, { width, height } = this.canvas, old = this.stores[name];
+    if (old && old.width === width && old.height === height) return old.frame;
+    if (old) {
+      gl.deleteFramebuffer(old.frame);
+      old.parts.forEach((part) => gl.deleteRenderbuffer(part));
     }
-    const frame = gl.createFramebuffer(), stores = [];
+    const frame = gl.createFramebuffer(), parts = [];
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     for (const [format, place] of [[gl.RGBA8, gl.COLOR_ATTACHMENT0], [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT]]) {
-      const store = gl.createRenderbuffer();
-      gl.bindRenderbuffer(gl.RENDERBUFFER, store);
-      gl.renderbufferStorage(gl.RENDERBUFFER, format, width, height);
-      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, store);
-      stores.push(store);
+      const part = gl.createRenderbuffer(), most = samples && gl.getParameter(gl.MAX_SAMPLES);
+      gl.bindRenderbuffer(gl.RENDERBUFFER, part);
+      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, Math.min(samples, most), format, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, part);
+      parts.push(part);
     }
-    this.picking = { frame, stores, width, height };
+    this.stores[name] = { frame, parts, width, height };
+    return frame;
   }
 
   /** Wait until all that was asked for has been drawn. */

@@ -46,16 +46,15 @@ function legend(scalar, frame, outside) {
     const [low, high] = scalar.limits, one = !(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)));
     const stops = one ? [scalar.stops[scalar.stops.length >> 1]] : scalar.stops;
     const colours = stops.length > 1 ? stops.map(css).join(",") : `${css(stops[0])},${css(stops[0])}`;
-    const marks = one ? [low] : [low, (low + high) / 2, high];
+    // round-off about 0 is 0
+    const middle = Math.abs(low + high) < 1e-6 * (high - low) ? 0 : (low + high) / 2;
+    const marks = one ? [low] : [low, middle, high];
     const ends = element("div", { class: "ends" }, ...marks.map((x) => element("span", {}, brief(x))));
     parts.push(element("div", { class: "bar", style: `background:linear-gradient(to right,${colours})` }), ends);
   }
   if (frame.euler.some((x) => x !== 1)) parts.push(element("div", { class: "row" }, swatch(outside, "no disk", "")));
   return parts;
 }
-
-/** A number of a colour bar, with four digits. */
-const brief = (x) => written(Number(x.toPrecision(4)));
 
 /** Rows (name, text) of what is known of a bubble. */
 function rowsOf(frame, place) {
@@ -68,6 +67,7 @@ function rowsOf(frame, place) {
     ["target volume", written(frame.targets[place])],
   ];
   if (frame.values.pressure) rows.push(["pressure", written(value("pressure"))]);
+  if (frame.values.gap) rows.push(["gap", written(value("gap"))]);
   rows.push(["mean Gaussian curvature", written(value("curvature"))]);
   if (frame.euler[place] !== 1) rows.push(["Euler number", written(frame.euler[place])]);
   return rows;

@@ -14,51 +14,57 @@ uniform usampler2D u_bubbles;
 uvec4 bubble(int place) { return texelFetch(u_bubbles, ivec2(place % ${ROW}, place / ${ROW}), 0); }
 `;
 
+// Colours and light are found at the corners of triangles, so that filling them costs little.
 const PATCH_VERTEX = `${COMMON}
 uniform float u_sink;
+uniform vec3 u_light;
+uniform bool u_charged;
 layout(location = 0) in vec4 a_point;
 layout(location = 1) in vec4 a_normal;
 layout(location = 2) in uint a_owner;
+flat out vec3 v_colour;
+flat out float v_pale;
 flat out uint v_owner;
-out vec3 v_normal;
-out float v_share;
+out vec2 v_share; // of the colour bar, and the cosine to the light
 void main() {
   vec3 p = u_low + u_side * a_point.xyz;
   vec3 n = normalize(a_normal.xyz);
   // what reaches under its neighbours lies below them from both sides
   if (a_normal.w > 0.5) p -= u_sink * (dot(n, u_eye - p) < 0.0 ? -1.0 : 1.0) * n;
+  uvec4 texel = bubble(int(a_owner));
+  v_pale = u_charged && (texel.a & ${CHARGED}u) == 0u ? 1.0 : 0.0;
+  v_colour = mix(vec3(texel.rgb) / 255.0, vec3(0.93), v_pale);
   v_owner = a_owner;
-  v_normal = n;
-  v_share = a_point.w;
+  v_share = vec2(a_point.w, dot(n, u_light));
   gl_Position = u_clip * vec4(p, 1.0);
 }`;
 
 // Brightness and the paler backs are those of the pictures that plot_foam draws.
 const PATCH_FRAGMENT = `${COMMON}
 uniform sampler2D u_ramp;
-uniform vec3 u_light;
-uniform int u_mode; // 0: colours of bubbles, 1: of the surface's points, 2: numbers for picking
-uniform bool u_charged;
-flat in uint v_owner;
-in vec3 v_normal;
-in float v_share;
+uniform bool u_by_point; // colours of the surface's points in place of the bubbles'
+flat in vec3 v_colour;
+flat in float v_pale;
+in vec2 v_share;
 out vec4 o_colour;
 void main() {
-  if (u_mode == 2) {
-    uint n = v_owner + 1u;
-    o_colour = vec4(float(n & 255u), float((n >> 8) & 255u), float((n >> 16) & 255u), 255.0) / 255.0;
-    return;
-  }
-  uvec4 texel = bubble(int(v_owner));
-  vec3 colour = vec3(texel.rgb) / 255.0;
-  if (u_mode == 1) colour = texture(u_ramp, vec2((0.5 + 255.0 * v_share) / 256.0, 0.5)).rgb;
-  if (u_charged && (texel.a & ${CHARGED}u) == 0u) colour = vec3(0.93);
-  vec3 normal = normalize(v_normal);
+  vec3 colour = v_colour;
+  if (u_by_point && v_pale == 0.0) colour = texture(u_ramp, vec2((0.5 + 255.0 * v_share.x) / 256.0, 0.5)).rgb;
+  float light = v_share.y;
   if (!gl_FrontFacing) {
     colour = mix(vec3(0.62), colour, 0.25);
-    normal = -normal;
+    light = -light;
   }
-  o_colour = vec4(colour * (0.72 + 0.28 * clamp(dot(normal, u_light), 0.0, 1.0)), 1.0);
+  o_colour = vec4(colour * (0.72 + 0.28 * clamp(light, 0.0, 1.0)), 1.0);
+}`;
+
+/** Numbers of the bubbles in place of colours: what lies under a finger. */
+const PICK_FRAGMENT = `${COMMON}
+flat in uint v_owner;
+out vec4 o_colour;
+void main() {
+  uint n = v_owner + 1u;
+  o_colour = vec4(float(n & 255u), float((n >> 8) & 255u), float((n >> 16) & 255u), 255.0) / 255.0;
 }`;
 
 const LINE_VERTEX = `${COMMON}
@@ -82,6 +88,11 @@ flat out float v_radius;
 flat out vec4 v_colour;
 void main() {
   vec3 a = u_low + u_side * a_tail.xyz, b = u_low + u_side * a_head.xyz;
+  // lines on the far side of a closed surface are behind it
+  vec3 ea = u_eye - a, eb = u_eye - b;
+  float far_a = length(ea), far_b = length(eb);
+  bool away = dot(a_tail_normal.xyz, ea) * far_b + dot(a_head_normal.xyz, eb) * far_a < 0.05 * far_a * far_b;
+  if (!u_edged && away) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
   uint flags = bubble(a_beside.x).a;
   if (a_beside.y >= 0) flags |= bubble(a_beside.y).a;
   float width = u_width, pull = u_pull;
@@ -96,12 +107,10 @@ void main() {
   } else if ((flags & ${NEIGHBOUR}u) != 0u) {
     colour = u_accent; width = max(width, u_dots) + 0.4 * u_dots; pull *= 2.0; shown = true;
   }
-  // lines on the far side of a closed surface are behind it
-  bool away = dot(a_tail_normal.xyz, normalize(u_eye - a)) + dot(a_head_normal.xyz, normalize(u_eye - b)) < 0.05;
-  if (!shown || (!u_edged && away)) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
+  if (!shown) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
   // towards the eye: nearer, but in the same place of the picture
-  a += pull * normalize(u_eye - a);
-  b += pull * normalize(u_eye - b);
+  a += (pull / far_a) * ea;
+  b += (pull / far_b) * eb;
   vec4 ca = u_clip * vec4(a, 1.0), cb = u_clip * vec4(b, 1.0);
   vec2 pa = ca.xy / ca.w * u_half, pb = cb.xy / cb.w * u_half;
   float len = length(pb - pa);

@@ -1,5 +1,8 @@
 // The page: state, drawing when something has changed, and the controls.
-const SLOW = 45; // milliseconds between frames of a movement, above which they are drawn coarser
+const SLOW = 45; // milliseconds between pictures of a movement, above which they are drawn in fewer dots
+const HIDDEN = 2000; // nobody looked
+const MOVING_DOTS = 2; // in a pixel of the page at most, while the picture moves
+const REST = 150; // milliseconds after which what has stopped is drawn in all detail
 
 class Viewer {
   constructor(facts) {
@@ -11,8 +14,9 @@ class Viewer {
     this.camera = new Camera(low.map((x) => x + side / 2), side / 2, facts.view);
     this.number = 0;
     this.pickedId = null;
-    this.coarse = 1;
-    this.moved = 0;
+    this.coarse = 1; // share of the dots that a moving picture has
+    this.turning = false;
+    this.size = [1, 1];
     this.scalar = facts.scalars.find((item) => item.name === facts.colorBy);
   }
 
@@ -35,7 +39,7 @@ class Viewer {
     const { dark } = this;
     return {
       cube: this.facts.cube,
-      mode: this.scalar.name === "surface" ? 1 : 0,
+      byPoint: this.scalar.name === "surface",
       films: byId("films").checked,
       charged: byId("charged").checked,
       film: hex(this.facts.colours.film),
@@ -47,7 +51,13 @@ class Viewer {
   }
 
   get dots() {
-    return Math.min(window.devicePixelRatio || 1, 3) * this.coarse;
+    const dots = window.devicePixelRatio || 1;
+    return this.moves ? Math.min(dots, MOVING_DOTS) * this.coarse : Math.min(dots, 3);
+  }
+
+  /** Whether pictures follow each other: these have less detail, and the last is drawn again in all. */
+  get moves() {
+    return this.turning || Boolean(this.playing);
   }
 
   redraw() {
@@ -57,24 +67,38 @@ class Viewer {
   drawn() {
     this.pending = null;
     const { clientWidth, clientHeight } = this.canvas;
-    this.painter.resize(clientWidth, clientHeight, this.dots);
-    this.painter.draw(this.camera, this.look);
+    if (clientWidth && clientHeight) this.size = [clientWidth, clientHeight]; // none while it is printed
+    this.painter.resize(...this.size, this.dots);
+    this.painter.draw(this.camera, this.look, this.moves);
+    // the window asks for the next picture once this one is drawn, however often fingers move
+    const began = performance.now();
+    if (this.moves) requestAnimationFrame(() => this.paced(performance.now() - began));
     this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
   }
 
-  /** While the picture moves: fewer dots if frames come too slowly. */
   moving() {
-    const now = performance.now(), pause = now - this.moved;
-    this.moved = now;
-    if (pause < 400) {
-      this.pace = 0.7 * (this.pace ?? pause) + 0.3 * pause;
-      if (this.pace > SLOW && this.coarse > 0.4) { this.coarse = Math.max(0.4, 0.8 * this.coarse); this.pace = SLOW; }
-    } else this.pace = undefined;
+    this.stirred();
     this.redraw();
   }
 
+  /** A picture of a movement took so long: fewer dots if pictures come too slowly, more if they come fast. */
+  paced(took) {
+    if (took > HIDDEN) return;
+    this.pace = 0.7 * (this.pace ?? took) + 0.3 * took;
+    if (this.pace > SLOW) this.coarse = Math.max(0.4, 0.8 * this.coarse), this.pace = SLOW;
+    else if (this.pace < 0.5 * SLOW) this.coarse = Math.min(1, 1.02 * this.coarse);
+  }
+
+  /** Until it has rested for a while. */
+  stirred() {
+    this.turning = true;
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => this.settled(), REST);
+  }
+
   settled() {
-    if (this.coarse !== 1) { this.coarse = 1; this.redraw(); }
+    clearTimeout(this.resting);
+    if (this.turning) { this.turning = false; this.redraw(); }
   }
 
   // ------------------------------------------------------------------ state
@@ -119,10 +143,11 @@ class Viewer {
   told() {
     const { frame, place, facts, number } = this, about = frame.facts;
     byId("frame-facts").textContent =
-      `${about.held} bubbles, energy ${written(about.energy)}, gap ${written(about.gap)}`;
+      `${about.held} bubbles, energy ${written(about.energy)}, gap ${between(...about.gap)}`;
     byId("frame").value = number;
     byId("frame").setAttribute("aria-valuetext", about.label);
-    byId("frame-label").textContent = `${about.label} (${number + 1}/${facts.frames.length})`;
+    const place_in_all = ` (${number + 1}/${facts.frames.length})`;
+    byId("frame-label").replaceChildren(element("span", { title: about.label }, about.label), place_in_all);
     byId("unpick").hidden = this.pickedId === null;
     if (this.pickedId !== null) byId("find-id").value = String(this.pickedId);
     const gone = element("p", { class: "hint" }, `There is no bubble ${this.pickedId} in this frame.`);
@@ -193,7 +218,18 @@ class Viewer {
       this.coloured();
       this.redraw();
     });
+    window.addEventListener("beforeprint", () => this.printed());
     if (facts.frames.length > 1) this.player();
+  }
+
+  /** A copy of the picture on white, which printers get: what graphics cards draw does not stay. */
+  printed() {
+    const { canvas } = this, paper = byId("paper"), dots = Math.max(window.devicePixelRatio || 1, 2);
+    this.painter.resize(...this.size, dots);
+    this.painter.draw(this.camera, { ...this.look, ground: [1, 1, 1], dots });
+    Object.assign(paper, { width: canvas.width, height: canvas.height });
+    paper.getContext("2d").drawImage(canvas, 0, 0);
+    this.redraw();
   }
 
   home() {
@@ -222,7 +258,11 @@ class Viewer {
     byId("player").hidden = false;
     const slider = byId("frame");
     slider.max = this.facts.frames.length - 1;
-    slider.addEventListener("input", () => { this.play(false); this.show(Number(slider.value)); });
+    slider.addEventListener("input", () => {
+      this.play(false);
+      this.stirred();
+      this.show(Number(slider.value));
+    });
     byId("play").addEventListener("click", () => this.play(!this.playing));
   }
 
@@ -231,7 +271,7 @@ class Viewer {
     clearTimeout(this.timer);
     byId("play").setAttribute("aria-label", on ? "Pause" : "Play");
     byId("play-shape").setAttribute("d", on ? "M7 5.5h3.5v13H7zM13.5 5.5H17v13h-3.5z" : "M8 5.5v13l11-6.5z");
-    if (!on) return;
+    if (!on) return this.redraw();
     const last = this.facts.frames.length - 1;
     const step = async (number) => {
       const began = performance.now();
@@ -285,13 +325,18 @@ window.foamViewer = {
     const at = projected(camera, box.width, box.height, point);
     return at && [at[0] + box.left, at[1] + box.top];
   },
-  /** Milliseconds each of `count` pictures takes, turning a little between them. */
-  time: async (count) => {
+  /** What the last picture was drawn of: triangles of bubbles and of films, level 0 in all detail. */
+  drawn: async () => {
+    const viewer = await ready;
+    return { ...viewer.painter.counts, moving: viewer.moves, pictures: Number(viewer.canvas.dataset.drawn) };
+  },
+  /** Milliseconds each of `count` pictures takes, turning a little between them; at rest or while moving. */
+  time: async (count, moving = false) => {
     const { camera, canvas, painter, look } = await ready, out = [];
     for (let k = 0; k < count; k++) {
       camera.turn(6, 2, canvas.clientWidth, canvas.clientHeight);
       const began = performance.now();
-      painter.draw(camera, look);
+      painter.draw(camera, look, moving);
       painter.finish();
       out.push(performance.now() - began);
     }
