@@ -32,6 +32,7 @@ WRONG = {
     "partition": ["cube", "-n", "12"],
     "convert": ["no_such_file.npz", "out.vtp"],
     "drift": ["no_such_file.npz", "--duration", "1"],
+    "coarsen": ["no_such_file.npz", "--until", "1"],
 }
 
 
@@ -92,7 +93,7 @@ def test_all_verbs_are_there() -> None:
     verbs = {path[0] for path, _ in LEAVES}
     assert verbs >= {
         "run", "foam", "relax", "check", "potential", "defects", "ensemble", "view", "convert", "figures",
-        "info", "plot", "partition", "cluster", "drift",
+        "info", "plot", "partition", "cluster", "drift", "coarsen",
     }  # fmt: skip
 
 

@@ -201,3 +201,12 @@ def test_the_motion_page() -> None:
     assert space["moved"].completed
     assert (np.diff(space["angle"]) < 0.0).all()
     assert (np.diff(space["moved"].step_energies) < 0.0).all()
+
+
+def test_the_coarsening_page() -> None:
+    space = run(ROOT / "docs" / "coarsening.md")
+    assert space["run"].completed
+    foam = space["foam"]
+    law = np.pi / 3.0 * (foam.network.sides - 6) + foam.bubble_areas
+    np.testing.assert_allclose(space["rate"] / 0.01, law, atol=1e-3)
+    assert space["run"].foam.n_bubbles <= 30

@@ -42,6 +42,7 @@ def test_every_example_is_tested() -> None:
         "07_bubble_on_a_torus",
         "09_three_bubbles_drifting",
         "08_gap_against_curvature",
+        "10_coarsening_on_a_sphere",
     }  # fmt: skip
     assert {p.stem for p in EXAMPLES.glob("*.toml")} == {"foam", *STUDIES}
 
@@ -170,3 +171,10 @@ def test_the_table_and_the_page_of_scars() -> None:
             assert row["of these scars"] <= row["clusters of charge 1"] <= 12
         mean = sum(row["per site"] for row in same) / len(same)
         assert f"| {n} | {len(same)} | {same[0]['R/a']:.2f} | {mean:.2f} ± " in page
+
+
+def test_coarsening_on_a_sphere(tmp_path: Path) -> None:
+    off, run = example("10_coarsening_on_a_sphere").main(24, 18, tmp_path)
+    assert off < 1e-5
+    assert run.n_t2 >= 6
+    assert (tmp_path / "coarsening.png").stat().st_size > 10_000

@@ -108,6 +108,7 @@ SCRIPTS: dict[str, tuple[tuple[Any, ...], str | Callable[[Path, Path], None]]] =
     "07_bubble_on_a_torus": ((), "torus_energy.png"),
     "08_gap_against_curvature": ((), shifted_tube),
     "09_three_bubbles_drifting": (("out",), "three_bubbles.png"),
+    "10_coarsening_on_a_sphere": ((60, 30, "out"), "coarsening.png"),
 }
 #: What a new example gets until it stands above: ``main("out")`` and the first picture that it writes.
 PLAIN: tuple[tuple[Any, ...], str | Callable[[Path, Path], None]] = (("out",), "*.png")

@@ -71,6 +71,13 @@ def scars(path: Path) -> None:
     wf.save_figure(path, drawn(rows))
 
 
+def coarsening(path: Path) -> None:
+    """200 unequal bubbles on a sphere coarsen to 40."""
+    cell = wf.HeleShawCell(wf.Sphere(1.0), gap=0.01)
+    run = wf.coarsen(relaxed(wf.voronoi_foam(cell, 200, seed=0, volumes=0.4)), until=40)
+    wf.save_figure(path, wf.plot_coarsening(run), dpi=110)
+
+
 def drift(path: Path) -> None:
     """Bubbles that drift to the outer equator: examples/09_three_bubbles_drifting.py."""
     with tempfile.TemporaryDirectory() as folder:
@@ -113,5 +120,6 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "torus_energy": of_the_paper("torus"),
     "scars": scars,
     "drift": drift,
+    "coarsening": coarsening,
     "viewer": viewer,
 }

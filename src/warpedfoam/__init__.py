@@ -77,8 +77,28 @@ if TYPE_CHECKING:
         write_vtm,
         write_vtp,
     )
-    from warpedfoam.motion import Drift, DriftEvent, drift, resume_drift
-    from warpedfoam.moves import ContactEvent, T1Event, add_markers, join, part, remove_markers, t1, wall_t1
+    from warpedfoam.motion import (
+        Coarsening,
+        CoarseningEvent,
+        Drift,
+        DriftEvent,
+        coarsen,
+        drift,
+        gas_dissipation,
+        gas_flow,
+        resume_drift,
+    )
+    from warpedfoam.moves import (
+        ContactEvent,
+        T1Event,
+        add_markers,
+        join,
+        part,
+        remove_markers,
+        t1,
+        t2,
+        wall_t1,
+    )
     from warpedfoam.network import CellNetwork, network_from_loops
     from warpedfoam.plot import (
         animate,
@@ -86,6 +106,7 @@ if TYPE_CHECKING:
         plot_charge_energies,
         plot_charge_profile,
         plot_cluster_potential,
+        plot_coarsening,
         plot_correlations,
         plot_defects,
         plot_drift,
@@ -184,6 +205,8 @@ __all__ = [
     "ChargeEnergies",
     "ChargeProfile",
     "ClusterPotential",
+    "Coarsening",
+    "CoarseningEvent",
     "ContactEvent",
     "ConvergenceError",
     "Correlations",
@@ -251,12 +274,15 @@ __all__ = [
     "cluster_foam",
     "cluster_labels",
     "cluster_potential",
+    "coarsen",
     "correlations",
     "defects",
     "drift",
     "drift_path",
     "equilibrium_report",
     "foam_statistics",
+    "gas_dissipation",
+    "gas_flow",
     "geodesic_circle",
     "geodesic_distances",
     "geodesic_report",
@@ -274,6 +300,7 @@ __all__ = [
     "plot_charge_energies",
     "plot_charge_profile",
     "plot_cluster_potential",
+    "plot_coarsening",
     "plot_correlations",
     "plot_defects",
     "plot_drift",
@@ -301,6 +328,7 @@ __all__ = [
     "save_picture",
     "side_distribution",
     "t1",
+    "t2",
     "theory",
     "thomson_points",
     "voronoi_foam",
@@ -342,13 +370,15 @@ _HOMES = {
         "write_films_parquet write_glb write_graph_json write_graphml write_obj write_ply write_pvd "
         "write_record write_vtm write_vtp"
     ),
-    "motion": "Drift DriftEvent drift resume_drift",
-    "moves": "ContactEvent T1Event add_markers join part remove_markers t1 wall_t1",
+    "motion": (
+        "Coarsening CoarseningEvent Drift DriftEvent coarsen drift gas_dissipation gas_flow resume_drift"
+    ),
+    "moves": "ContactEvent T1Event add_markers join part remove_markers t1 t2 wall_t1",
     "network": "CellNetwork network_from_loops",
     "plot": (
         "animate plot_annealing plot_charge_energies plot_charge_profile plot_cluster_potential "
-        "plot_correlations plot_defects plot_drift plot_foam plot_foam_3d plot_histogram plot_map "
-        "plot_order plot_potential plot_potential_path plot_relaxation plot_sides save_figure "
+        "plot_coarsening plot_correlations plot_defects plot_drift plot_foam plot_foam_3d plot_histogram "
+        "plot_map plot_order plot_potential plot_potential_path plot_relaxation plot_sides save_figure "
         "save_picture"
     ),
     "relax": "LayeredRelaxation Relaxation RelaxationHistory outline_gap relax with_contacts",

@@ -34,6 +34,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "warpedfoam drift out/foam.npz --duration 10 -o drift/",
         "warpedfoam drift drift/drift.h5 --frame 0 --duration 20 --yield-friction 0.01 --animation -o slow/",
     ),
+    "coarsen": (
+        "warpedfoam coarsen out/foam.npz --until 100 -o coarse/",
+        "warpedfoam coarsen out/foam.npz --duration 5 --every 0.1 --vanish 0.001 -o coarse/",
+    ),
     "plot": (
         "warpedfoam plot out/foam.npz --color-by pressure -o foam.pdf --width 86",
         "warpedfoam plot out/foam.npz --kind map --projection hammer --outline -o map.svg",

@@ -1,4 +1,4 @@
-"""The command ``drift``; it hands its arguments to `warpedfoam.cli.drifting`."""
+"""The commands ``drift`` and ``coarsen``; they hand their arguments to modules of their own."""
 
 from __future__ import annotations
 
@@ -76,6 +76,73 @@ def drift(
                 picture=picture,
                 animation=animation,
                 color_by=color_by,
+                progress=report,
+            )
+        if as_json:
+            print(json.dumps(facts, allow_nan=False), flush=True)
+        elif not quiet:
+            print(job.summary_text(facts), flush=True)
+    if not facts["completed"]:
+        raise typer.Exit(NOT_CONVERGED)
+
+
+@motion_verbs.command(epilog=epilog("coarsen"))
+def coarsen(
+    file: FoamFile,
+    duration: Annotated[float | None, typer.Option("--duration", help="Time to cover.")] = None,
+    until: Annotated[
+        int | None, typer.Option("--until", help="End when no more bubbles than this are left.")
+    ] = None,
+    permeability: Annotated[
+        float,
+        typer.Option("--permeability", help="Of the films: volume of gas per time, area and pressure."),
+    ] = 1.0,
+    every: Annotated[
+        float | None,
+        typer.Option("--every", help="Time between frames; a fiftieth of the duration if left out."),
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Error of a time step, in mean volumes.")
+    ] = 0.01,
+    step: Annotated[
+        float | None, typer.Option("--step", help="A fixed time step in place of adaptive ones.")
+    ] = None,
+    vanish: Annotated[
+        float, typer.Option("--vanish", help="Bubbles below this many mean volumes vanish.")
+    ] = 0.003,
+    order: Annotated[
+        int | None, typer.Option("--order", help="Polynomial order of the films; the foam's if left out.")
+    ] = None,
+    frame: Frame = -1,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where an earlier run was stopped.")] = False,
+    out: Folder = "out",
+    picture: Picture = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Let a foam coarsen: gas passes through its films, large bubbles grow, small ones vanish."""
+    with ending_well(debug), signals():
+        from warpedfoam.cli import coarsening as job
+
+        options = {
+            "duration": duration,
+            "until": until,
+            "permeability": permeability,
+            "every": every,
+            "tolerance": tolerance,
+            "step": step,
+            "vanish": vanish,
+            "order": order,
+        }
+        with progress_bars(quiet=quiet) as report:
+            facts = job.coarsen_file(
+                file,
+                frame=frame,
+                out=out,
+                options=options,
+                resume=resume,
+                picture=picture,
                 progress=report,
             )
         if as_json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from warpedfoam.io.atomic import PathLike, writable_path
 from warpedfoam.io.trajectory import SUFFIXES, Trajectory, TrajectoryWriter
 from warpedfoam.motion.changes import CHANGES, chords, cutoffs
 from warpedfoam.motion.drag import FrictionLaw
+from warpedfoam.motion.frames import new_trajectory
 from warpedfoam.motion.markers import spaced
 from warpedfoam.motion.meeting import crosses, marked
 from warpedfoam.motion.options import DriftOptions
@@ -198,7 +198,8 @@ def drift(
     if going_on and path.exists():
         _recall(run, path)
     else:
-        _create(run, path, span)
+        told = {"options": run.options.told(), "duration": span}
+        new_trajectory(path, lambda writer: _write_frame(run, writer, told))
     with TrajectoryWriter(path, append=True) as writer:
         return _travelled(run, span, writer, progress)
 
@@ -262,19 +263,6 @@ def _keep_frame(run: _Run) -> None:
     run.foams.append(foam)
     run.times.append(run.time)
     run.state = run.stepper.state_of(foam)
-
-
-def _create(run: _Run, path: Path, duration: float) -> None:
-    """A trajectory with the first frame, there whole or not at all."""
-    if path.exists():
-        raise FileExistsError(f"cannot write {path}: it is there already; use resume=True or another name")
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        with TrajectoryWriter(temporary) as writer:
-            _write_frame(run, writer, {"options": run.options.told(), "duration": duration})
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _write_frame(run: _Run, writer: TrajectoryWriter, more: dict[str, Any]) -> None:

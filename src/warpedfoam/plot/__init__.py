@@ -2,6 +2,7 @@
 
 from warpedfoam.plot.charted import Charted
 from warpedfoam.plot.cluster_picture import plot_cluster_potential
+from warpedfoam.plot.coarsening_picture import plot_coarsening
 from warpedfoam.plot.curves import plot_charge_energies, plot_charge_profile, plot_correlations, plot_sides
 from warpedfoam.plot.defect_picture import plot_defects, plot_order
 from warpedfoam.plot.drift_picture import animate, plot_drift
@@ -30,6 +31,7 @@ __all__ = [
     "plot_charge_energies",
     "plot_charge_profile",
     "plot_cluster_potential",
+    "plot_coarsening",
     "plot_correlations",
     "plot_defects",
     "plot_drift",
