@@ -305,7 +305,8 @@ def one_ring(network: CellNetwork, values: Floats) -> Floats:
 def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do.
 
-    Parts of a foam that no films join move on their own, and turn where the surface is flat.
+    Parts of a foam that no films join move on their own, turn where the surface is flat, and take no notice
+    of a rim that they do not touch.
     """
     modes = cell.rigid_motions(state.points)
     network = state.network
@@ -318,7 +319,14 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
             # what goes round the surface cannot turn
             modes = np.concatenate([modes, np.where(round_[part][:, None], 0.0, turning)[None]])
         own = part == np.arange(count)[:, None]
-        modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
+        bound = np.zeros(count, dtype=np.bool_)
+        bound[part[network.rim_vertices]] = True
+        kinds = [(modes, own)]
+        if cell.surface.rim is not None:
+            # what touches no rim does not mind its moving
+            kinds = [(modes, own[bound]), (cell.free_motions(state.points), own[~bound])]
+        parts = [(some[None] * mine[:, None, :, None]).reshape(-1, *some.shape[1:]) for some, mine in kinds]
+        modes = np.concatenate(parts)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     whole = np.linalg.norm(matrix, axis=(1, 2))
