@@ -22,6 +22,7 @@ from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.layered import relax_layers, require_lines
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
 from warpedfoam.relax.marking import with_markers
+from warpedfoam.relax.mixing import Mixing
 from warpedfoam.relax.reach import LOOKS, MUCH, UNDECIDED, next_reach, stiffer, turned_parts, which_way
 from warpedfoam.relax.result import Relaxation, RelaxationHistory
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
@@ -88,6 +89,7 @@ class _Run:
     backs: int = 0
     reach: float = EXACT_STEP
     hint: float = 0.0
+    mixing: Mixing = field(default_factory=Mixing)
 
     def snapshot(self) -> tuple[object, ...]:
         """What `restore` brings back."""
@@ -435,6 +437,11 @@ def _exact_step(run: _Run, lin: Linearised) -> None:
             size = _size(step)
             seen.append((shift, 1.0 / max(size, 1e-300)))
         run.hint = shift * min(size / most, 1.0) if size > 0.5 * most else 0.0
+        if size <= most and kkt is first:
+            step = run.mixing.mixed(run.system.cell, run.system.length, run.state, step, now.force)
+            size = _size(step)
+        else:
+            run.mixing.forget()
     if kkt is not first and now.force < SADDLE:
         # next to a saddle the force gives no way out: take the mode that goes down
         mode = kkt.softest_mode(step.vertices)
