@@ -316,6 +316,8 @@ def test_displacements_are_right_to_third_order() -> None:
 
 def test_spacing_markers_keeps_the_shape() -> None:
     foam = wf.relax(one_bubble(order=12)).foam
+    # relaxed outlines have theirs nearly even
+    foam = wf.remove_markers(wf.add_markers(foam, [0], 0.93), foam.network.heads[:1])
     stepper = Stepper(foam, FrictionLaw(1.0), hold_volumes=True, method="euler")
     state = stepper.state_of(foam)
     assert np.ptp(foam.film_lengths) > 0.03

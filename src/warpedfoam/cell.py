@@ -10,6 +10,7 @@ import numpy as np
 from warpedfoam.arrays import Floats, as_integer, as_number
 from warpedfoam.surfaces.fitted_gap import FittedGap, fitted_gap
 from warpedfoam.surfaces.gap_field import Function, GapField
+from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.level_twins import without_twin
 from warpedfoam.surfaces.protocol import SIZES, Layer, Surface
 
@@ -141,3 +142,11 @@ class HeleShawCell:
     def rigid_motions(self, points: Floats) -> Floats:
         """Velocity fields (k, n, 3) of the motions that leave both plates where they are."""
         return (self.surface if self._varied is None else self._varied).rigid_motions(points)
+
+    def free_motions(self, points: Floats) -> Floats:
+        """`rigid_motions` of what touches no rim (k, n, 3): the rims need not stay where they are."""
+        if self._varied is not None:
+            return self._varied.free_motions(points)
+        if isinstance(self.surface, LevelSurface):
+            return self.surface.free_motions(points)
+        return self.surface.rigid_motions(points)

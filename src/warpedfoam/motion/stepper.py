@@ -74,8 +74,6 @@ class Stepper:
         self.system = System(
             foam.cell, foam.target_volumes, foam.order, SuperLU(), foam.n_bubbles, foam.exterior
         )
-        # markers hold still along their film: they are spaced between steps
-        self.system.loose = False
         self.unit = foam.tension * self.system.film_unit
         self.scale = self.unit / self.system.mean_volume
         self.rounding = ROUND if self.system.invariant else ROUGH

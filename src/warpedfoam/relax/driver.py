@@ -124,6 +124,7 @@ def relax(
     method = factoriser(solver, foam.n_bubbles)
     start = foam.with_order(p)
     system = System(foam.cell, foam.target_volumes, p, method, foam.n_bubbles, foam.exterior)
+    system.follows = foam.exterior is not None
     clock = Stopwatch(system.timings)
     scale = foam.tension * system.film_unit / system.mean_volume
     pressures = np.zeros(foam.n_bubbles) if foam.pressures is None else foam.pressures / scale

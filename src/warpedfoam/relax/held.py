@@ -12,8 +12,8 @@ from warpedfoam.moves.t1 import outward_tangents
 from warpedfoam.network import CellNetwork
 from warpedfoam.surfaces.protocol import Surface
 
-#: Stiffness of the links that space markers, and of the hold that keeps a ring of them from turning.
-LINK, GRIP = 1e-2, 1e-7
+#: Weights with which markers that follow are spaced: of the stretch of their links, and of their way.
+LINK, GRIP = 1e-2, 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +22,7 @@ class Held:
 
     ``share`` (k,) is one film's share of the stiffness that holds a vertex; ``turning`` (k,) how fast the
     line on which it moves turns towards the direction, κ_g of a rim. ``linked`` (m,) are films that end in
-    a marker and ``links`` (4, m) the stretch of their chords by steps of their ends: a weak stiffness on it
-    makes markers follow their neighbours when a bubble moves as a whole, along their films too.
+    a marker and ``links`` (4, m) the stretch of their chords by steps of their ends (`relax/following.py`).
     """
 
     vertices: Ints
@@ -34,25 +33,18 @@ class Held:
     links: Floats
 
 
-def held_vertices(
-    surface: Surface, network: CellNetwork, points: Floats, offsets: Floats, *, loose: bool = True
-) -> Held | None:
+def held_vertices(surface: Surface, network: CellNetwork, points: Floats, offsets: Floats) -> Held | None:
     """What is held at a state, or None.
 
-    A marker that slid along its film would exploit the quadrature; a rim vertex leaves the surface. In an
-    open cluster, which may travel far, markers are ``loose``: links make them follow their neighbours.
-    Where bubbles fill the surface they stay where they are along their film, which keeps Newton exact.
+    A marker that slid along its film would exploit the quadrature; a rim vertex leaves the surface.
     """
     parts = []
     linked, links = np.zeros(0, dtype=np.int64), np.zeros((4, 0))
     if len(network.markers):
         along = marker_tangents(surface, network, points, offsets)
         count = len(along)
-        parts.append(
-            (network.markers, along, np.full(count, 0.5 * (GRIP if loose else 1.0)), np.zeros(count))
-        )
-        if loose:
-            linked, links = _links(surface, network, points)
+        parts.append((network.markers, along, np.full(count, 0.5), np.zeros(count)))
+        linked, links = _links(surface, network, points)
     if surface.rim is not None and len(network.rim_vertices):
         at = points[network.rim_vertices]
         places = surface.rim.locate(at)
@@ -64,6 +56,20 @@ def held_vertices(
         return None
     vertices, directions, share, turning = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Held(vertices, directions, share, turning, linked, links)
+
+
+def without_markers(held: Held, count: int) -> Held | None:
+    """What is held but for the first ``count``, which are markers."""
+    if len(held.vertices) == count:
+        return None
+    return Held(
+        held.vertices[count:],
+        held.directions[count:],
+        held.share[count:],
+        held.turning[count:],
+        held.linked[:0],
+        held.links[:, :0],
+    )
 
 
 def _links(surface: Surface, network: CellNetwork, points: Floats) -> tuple[Ints, Floats]:
@@ -100,9 +106,6 @@ def hold(held: Held, network: CellNetwork, length: float, arrays: tuple[Floats, 
         block[:, rows] = np.einsum("kjf,jif->kif", block[:, rows], project)
         block[rows, rows] += held.share[index] * t[:, None] * t[None] + work * project
         hessian[:, :, film] = block
-    if held.linked.size:
-        pull = LINK * held.links[:, None] * held.links[None]
-        hessian[:4, :4, held.linked] += pull
 
 
 def moved_points(surface: Surface, network: CellNetwork, points: Floats, steps: Floats) -> Floats:

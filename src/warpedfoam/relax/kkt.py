@@ -39,8 +39,13 @@ class KKT:
         blocks = condensed.matrix[np.ix_(_ROWS, _ROWS)]
         blocks *= (_SIGN[:, None] * _SIGN)[..., None]
         self._matrix = self._pattern.matrix(blocks, np.concatenate([vertex_shift, -pressure_shift]))
+        pattern: object = self._pattern
+        if lin.following is not None:
+            self._matrix = lin.following.matrix(self._matrix, self._pattern)
+            # its entries change places
+            pattern = self._matrix
         clock.lap("assemble")
-        self._factor = lin.system.factoriser.factor(self._matrix, self._pattern)
+        self._factor = lin.system.factoriser.factor(self._matrix, pattern)
         clock.lap("solve")
 
     @property
@@ -50,17 +55,23 @@ class KKT:
 
     def _solve(self, rhs: Floats) -> Floats:
         clock = Stopwatch(self._timings)
+        following, split = self._lin.following, 2 * self._lin.state.network.n_vertices
+        if following is not None:
+            rhs = np.concatenate([following.forces(rhs[:split]), rhs[split:]])
         ordered = self._pattern.ordered(rhs)
         x = self._factor.solve(ordered)
         x += self._factor.solve(ordered - self._matrix @ x)
+        out = self._pattern.restored(x)
+        if following is not None:
+            out = np.concatenate([following.expanded(out[:split]), out[split:]])
         clock.lap("solve")
-        return self._pattern.restored(x)
+        return out
 
     def step(self, volume_fault: Floats) -> Step:
         """Solve for (−r, V − V*) and recover the offsets."""
         rhs = self._pattern.gather(self._condensed.rhs[_ROWS] * _SIGN[:, None])
         split = 2 * self._lin.state.network.n_vertices
-        rhs[:split] = self._lin.without_rigid(rhs[:split])
+        rhs[:split] = self._lin.without_rigid(self._lin.across(rhs[:split]))
         rhs[split:] += volume_fault
         return self._recovered(rhs, self._condensed)
 

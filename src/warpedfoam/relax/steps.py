@@ -17,6 +17,8 @@ from warpedfoam.relax.contacts import MOST, make_contacts, restrained, waiting
 from warpedfoam.relax.held import moved_points
 from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.marking import with_markers
+from warpedfoam.relax.mixing import Mixing
+from warpedfoam.relax.reach import LOOKS, MUCH, UNDECIDED, next_reach, stiffer, turned_parts, which_way
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
 from warpedfoam.relax.system import Linearised, State, Step, Stopwatch, System, one_ring, pinned_unknowns
 from warpedfoam.relax.wall_sweep import stood_up, turned_walls
@@ -33,8 +35,6 @@ LEAST_SHIFT, MOST_SHIFT = 1e-10, 0.03
 SADDLE, KICK = 1e-6, 0.05
 #: Least share of exact steps that go to and fro, and how often in a row before they are shortened.
 LEAST_DAMPING, PATIENCE = 1.0 / 16.0, 2
-#: After so many, and below this residual, markers of clusters stay where they are for so many steps.
-STALLS, NEAR, STAY = 10, 1e-3, 60
 
 
 @dataclass
@@ -60,8 +60,9 @@ class Run:
     last: np.ndarray = field(default_factory=lambda: np.zeros(0))
     damping: float = 1.0
     backs: int = 0
-    stalls: int = 0
-    stay: int = 0
+    reach: float = EXACT_STEP
+    hint: float = 0.0
+    mixing: Mixing = field(default_factory=Mixing)
 
     def snapshot(self) -> tuple[object, ...]:
         """What `restore` brings back."""
@@ -164,7 +165,7 @@ def _mend(run: Run) -> None:
             run.system = System(
                 cell, run.foam.target_volumes, foam.order, system.factoriser, run.foam.n_bubbles, exterior
             )
-            run.system.timings = system.timings
+            run.system.timings, run.system.follows = system.timings, system.follows
             units = run.system.mean_volume / system.mean_volume * system.film_unit / run.system.film_unit
             pressures = units * np.append(pressures, np.zeros(run.foam.n_bubbles - foam.n_bubbles))
     layout = Layout(network, points, offsets, source)
@@ -182,7 +183,7 @@ def exact_step(run: Run, lin: Linearised) -> None:
     if run.system.exterior is not None:
         # how a lone bubble may move depends on its shape: a disk cannot turn
         run.pins = pinned_unknowns(run.system.cell, run.state)
-    shift = float(np.clip(0.05 * now.force, LEAST_SHIFT, MOST_SHIFT))
+    shift = max(float(np.clip(0.05 * now.force, LEAST_SHIFT, MOST_SHIFT)), run.hint)
     condensed = lin.condensed(positive=False)
     kkt = newton_matrix(run, lin, condensed, shift)
     first = kkt
@@ -190,35 +191,55 @@ def exact_step(run: Run, lin: Linearised) -> None:
         shift = max(10.0 * shift, 1e-6)
         kkt = newton_matrix(run, lin, condensed, shift)
     step = kkt.step(now.volume) if right else None
-    size = 0.0
-    if step is not None:
-        size = max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
+    size = _size(step)
     if step is None or not np.isfinite(size):
         proximal_step(run, lin)
         return
+    most = EXACT_STEP
+    if run.system.exterior is not None:
+        most = run.reach = next_reach(run.reach, now.force)
+        seen = [(shift, 1.0 / max(size, 1e-300))]
+        while size > MUCH * most and len(seen) <= LOOKS:
+            shift = stiffer(seen, most)
+            kkt = newton_matrix(run, lin, condensed, shift)
+            step = kkt.step(now.volume)
+            size = _size(step)
+            seen.append((shift, 1.0 / max(size, 1e-300)))
+        run.hint = shift * min(size / most, 1.0) if size > 0.5 * most else 0.0
+        if size <= most and kkt is first:
+            step = run.mixing.mixed(run.system.cell, run.system.length, run.state, step, now.force)
+            size = _size(step)
+        else:
+            run.mixing.forget()
     if kkt is not first and now.force < SADDLE:
         # next to a saddle the force gives no way out: take the mode that goes down
         mode = kkt.softest_mode(step.vertices)
-        side = 1.0 if float((mode * step.vertices).sum()) >= 0.0 else -1.0
+        side = np.sign(_cosine(mode, step.vertices))
+        if run.system.exterior is not None and abs(_cosine(mode, step.vertices)) < UNDECIDED:
+            side = which_way(run.system.cell, run.state, mode)
         step = Step(step.vertices + side * KICK * mode, step.offsets, step.pressures)
         size = max(size, KICK)
-    share = run.share * min(1.0, EXACT_STEP / max(size, 1e-300))
-    # markers that follow make the matrix inexact: where that throws soft modes to and fro, shorter steps
-    # land between, and markers that stay make it exact
+    share = run.share * min(1.0, most / max(size, 1e-300))
+    # on level sets the matrix is not quite exact: where that throws soft modes to and fro, shorter steps
+    # land between
     back = run.last.shape == step.vertices.shape and now.force > 0.3 * run.past
     back = back and _cosine(step.vertices, run.last) < -0.5
     run.backs = run.backs + 1 if back else 0
-    run.stalls += back
-    if run.stalls > STALLS:
-        run.stalls, run.stay = 0, run.iteration + STAY
-    # beside a rim they would let a cluster slide off along a soft direction
-    if run.system.exterior is not None and run.system.cell.surface.rim is None:
-        run.system.loose = run.iteration >= run.stay or now.force > NEAR
     halve = run.backs >= PATIENCE
     run.damping = max(0.5 * run.damping, LEAST_DAMPING) if halve else min(2.0 * run.damping, 1.0)
     share *= run.damping
     run.past, run.last = now.force, step.vertices
-    _advance(run, Step(share * step.vertices, share * step.offsets, share * step.pressures))
+    step = Step(share * step.vertices, share * step.offsets, share * step.pressures)
+    if run.system.exterior is not None:
+        step = turned_parts(run.system.cell, run.state, step, run.system.length)
+    _advance(run, step)
+
+
+def _size(step: Step | None) -> float:
+    """Largest step of a vertex, in ℓ, or change of an offset."""
+    if step is None:
+        return 0.0
+    return max(float(np.abs(step.vertices).max()), float(np.abs(step.offsets).max(initial=0.0)))
 
 
 def _cosine(one: np.ndarray, other: np.ndarray) -> float:

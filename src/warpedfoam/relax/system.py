@@ -23,7 +23,8 @@ from warpedfoam.kernels.condense import Condensed, clip_to_positive, condense
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.network import CellNetwork
-from warpedfoam.relax.held import held_vertices, hold
+from warpedfoam.relax.following import Following
+from warpedfoam.relax.held import held_vertices, hold, without_markers
 from warpedfoam.relax.linear import Factoriser
 from warpedfoam.relax.pattern import Pattern
 
@@ -106,9 +107,9 @@ class System:
     ) -> None:
         self.cell, self.targets, self.factoriser = cell, targets, factoriser
         self.exterior = exterior
-        # in open clusters markers follow their neighbours
-        self.loose = exterior is not None
         self.loads: Loads | None = None
+        # whether markers go with their bubbles, or stay where they are along their film
+        self.follows = False
         self.length = float(np.sqrt(cell.surface.area / n_bubbles))
         self.mean_volume = float(targets.mean())
         if exterior is not None:
@@ -174,10 +175,15 @@ class Linearised:
         self.force[:4] *= system.length
         if system.loads is not None:
             system.loads.add(state, self.force, self.hessian)
-        held = held_vertices(system.cell.surface, network, state.points, state.offsets, loose=system.loose)
+        held = held_vertices(system.cell.surface, network, state.points, state.offsets)
+        self.following: Following | None = None
+        self._along: Floats | None = None
+        if held is not None and system.follows and len(network.markers):
+            self.following, self._along = Following(held, network), held.directions[: len(network.markers)]
+            held = without_markers(held, len(network.markers))
         if held is not None:
             hold(held, network, system.length, (self.force, self.volume, self.hessian))
-        if system.loads is None and (held is not None or not system.invariant):
+        if system.loads is None and (held is not None or self.following is not None or not system.invariant):
             # what is left of a rigid motion's torque is quadrature error: it must not drive a drift
             modes = rigid_modes(system.cell, state)
             self.rigid = np.linalg.qr(modes.T)[0] if len(modes) else None
@@ -222,7 +228,7 @@ class Linearised:
             [2 * network.tails, 2 * network.tails + 1, 2 * network.heads, 2 * network.heads + 1]
         )
         summed = np.bincount(ends, self.force[:4].ravel(), 2 * count).astype(np.float64, copy=False)
-        net = self.without_rigid(summed).reshape(count, 2)
+        net = self.without_rigid(self.across(summed)).reshape(count, 2)
         at_vertex = np.linalg.norm(net, axis=1)
         if len(self.force) > 4:
             # an offset u moves its node by u times the film's length
@@ -234,6 +240,15 @@ class Linearised:
         if not np.isfinite(self.hessian).all() or not np.isfinite(force) or not np.isfinite(volume_error):
             force = np.inf
         return Residuals(at_vertex, self.volume_fault, force, volume_error)
+
+    def across(self, forces: Floats) -> Floats:
+        """Vertex forces (2 n_vertices,) without those on markers along their films."""
+        if self._along is None:
+            return forces
+        out = forces.reshape(-1, 2).copy()
+        markers, t = self.state.network.markers, self._along
+        out[markers] -= np.einsum("mi,mi->m", out[markers], t)[:, None] * t
+        return out.ravel()
 
     def loaded(self, forces: Floats) -> Linearised:
         """The same state under ``forces`` (p + 3, F) in place of its own; Hessian and volumes are shared."""
@@ -290,22 +305,28 @@ def one_ring(network: CellNetwork, values: Floats) -> Floats:
 def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     """Rigid motions as vertex steps (k, 2 n_vertices), without what held vertices do not do.
 
-    Parts of a foam that no films join move on their own, and turn where the surface is flat.
+    Parts of a foam that no films join move on their own, turn where the surface is flat, and take no notice
+    of a rim that they do not touch.
     """
     modes = cell.rigid_motions(state.points)
     network = state.network
     if (network.bubble_euler != 1).any() or len(network.markers):
-        links = coo_array(
-            (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
-        )
-        count, part = connected_components(links, directed=False)
+        part = parts_of(network)
+        count = int(part.max()) + 1
         if cell.parallel and cell.surface.curvature_range() == (0.0, 0.0) and cell.surface.rim is None:
-            points, round_ = unfolded(cell, state, np.asarray(part, dtype=np.int64))
+            points, round_ = unfolded(cell, state, part)
             turning = np.cross(cell.surface.normals(state.points), points)
             # what goes round the surface cannot turn
             modes = np.concatenate([modes, np.where(round_[part][:, None], 0.0, turning)[None]])
         own = part == np.arange(count)[:, None]
-        modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
+        bound = np.zeros(count, dtype=np.bool_)
+        bound[part[network.rim_vertices]] = True
+        kinds = [(modes, own)]
+        if cell.surface.rim is not None:
+            # what touches no rim does not mind its moving
+            kinds = [(modes, own[bound]), (cell.free_motions(state.points), own[~bound])]
+        parts = [(some[None] * mine[:, None, :, None]).reshape(-1, *some.shape[1:]) for some, mine in kinds]
+        modes = np.concatenate(parts)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     whole = np.linalg.norm(matrix, axis=(1, 2))
@@ -318,6 +339,14 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     size = np.linalg.norm(flat, axis=1)
     kept: Floats = flat[(size > 1e-6 * cell.surface.size) & (size > SLIDES * whole)]
     return kept
+
+
+def parts_of(network: CellNetwork) -> Ints:
+    """Which part of a foam each vertex belongs to, films joining them; (n_vertices,)."""
+    links = coo_array(
+        (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
+    )
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
 def unfolded(cell: HeleShawCell, state: State, part: Ints) -> tuple[Floats, Bools]:

@@ -56,13 +56,20 @@ class FittedGap:
 
     @cached_property
     def symmetries(self) -> Floats:
-        """Combinations (k, m) of the plate's m rigid motions that leave the gap as it is.
+        """Combinations (k, m) of the plate's m rigid motions that leave the gap as it is."""
+        return self._kept(self.surface.rigid_motions(self.points))
+
+    @cached_property
+    def _free_symmetries(self) -> Floats:
+        return self._kept(self.surface.free_motions(self.points))
+
+    def _kept(self, motions: Floats) -> Floats:
+        """Combinations (k, m) of m motions (m, n, 3) at the points that leave the gap as it is.
 
         A motion v does if v · ∇ ln d is small everywhere, against |v| over the plate's size.
         """
         from scipy.linalg import eigh
 
-        motions = self.surface.rigid_motions(self.points)
         if not len(motions):
             return np.zeros((0, 0))
         slope = self.profile.gradients(self.points) / (self.values / self.mean)[:, None]
@@ -72,6 +79,13 @@ class FittedGap:
         values, vectors = eigh(moved, whole)
         out: Floats = vectors[:, values < self.surface.symmetry].T
         return frozen(out)
+
+    def free_motions(self, points: Floats) -> Floats:
+        """`rigid_motions` of what touches no rim, which need not stay where it is."""
+        if not len(self._free_symmetries):
+            return np.zeros((0, *points.shape))
+        out: Floats = np.einsum("ka,anx->knx", self._free_symmetries, self.surface.free_motions(points))
+        return out
 
     def rigid_motions(self, points: Floats) -> Floats:
         """Velocities (k, n, 3) of the motions that leave both plates where they are."""

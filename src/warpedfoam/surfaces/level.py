@@ -326,8 +326,23 @@ class LevelSurface(ABC):
         out: Floats = np.einsum("ka,anx->knx", self._symmetries[0], spread)
         return out
 
+    def free_motions(self, points: Floats) -> Floats:
+        """`rigid_motions` of what touches no rim, which need not stay where it is."""
+        if self.rim is None:
+            return self.rigid_motions(points)
+        spread = _generators(points - self._free_symmetries[1], self.size)
+        out: Floats = np.einsum("ka,anx->knx", self._free_symmetries[0], spread)
+        return out
+
     @cached_property
     def _symmetries(self) -> tuple[Floats, Floats]:
+        return self._tangent_motions(keep_rim=True)
+
+    @cached_property
+    def _free_symmetries(self) -> tuple[Floats, Floats]:
+        return self._tangent_motions(keep_rim=False)
+
+    def _tangent_motions(self, *, keep_rim: bool) -> tuple[Floats, Floats]:
         """Combinations (k, 6) of the six generators that are tangent everywhere, and the centre."""
         rule = self._patches.quadrature()
         points, weights = rule.points, rule.weights
@@ -335,8 +350,7 @@ class LevelSurface(ABC):
         spread = _generators(points - centre, self.size)[self._generators]
         across = np.einsum("anx,nx->an", spread, rule.normals)
         tangent = (across * weights) @ across.T
-        if self.rim is not None:
-            # a symmetry keeps the rim too
+        if keep_rim and self.rim is not None:
             at, inward, share = self.rim.samples()
             over = np.einsum("anx,nx->an", _generators(at - centre, self.size)[self._generators], inward)
             tangent += (over * (share * weights.sum() / share.sum())) @ over.T
