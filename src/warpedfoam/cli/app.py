@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
+from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import EXAMPLES, epilog
 from warpedfoam.cli.flags import OUTPUT, Color, Debug, Folder, Json, Picture, Quiet, Seed
 from warpedfoam.cli.foam_verbs import foam_verbs
@@ -288,10 +288,7 @@ def _run(options: Callable[[], Any], *, as_json: bool, quiet: bool, debug: bool)
             _warn_of_small_rims(chosen)
         with progress_bars(quiet=quiet) as report:
             job = run_job(chosen, report)
-        if as_json:
-            print(json.dumps(job.summary, allow_nan=False), flush=True)
-        elif not quiet:
-            print(summary_text(job.record), flush=True)
+        answer(job.summary, lambda: summary_text(job.record), as_json=as_json, quiet=quiet)
     if not job.relaxation.converged:
         say(f"did not converge: {job.relaxation.message}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
+from typing import Any
 
 import typer
 
@@ -29,6 +31,14 @@ class Stopped(BaseException):
 def say(text: str) -> None:
     """A line of our own on stderr."""
     print(f"warpedfoam: {' '.join(text.split())}", file=sys.stderr)
+
+
+def answer(facts: Mapping[str, Any], text: Callable[[], str], *, as_json: bool, quiet: bool) -> None:
+    """The summary on stdout: as one JSON object, as ``text`` or, if it is to be quiet, not at all."""
+    if as_json:
+        print(json.dumps(facts, allow_nan=False), flush=True)
+    elif not quiet:
+        print(text(), flush=True)
 
 
 @contextmanager

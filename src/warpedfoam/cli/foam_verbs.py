@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
 
-from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
+from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import epilog
 from warpedfoam.cli.flags import OUTPUT, Color, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet
 from warpedfoam.cli.progress import progress_bars
@@ -58,10 +57,7 @@ def relax(
                 picture=picture,
                 progress=report,
             )
-        if as_json:
-            print(json.dumps(job.summary, allow_nan=False), flush=True)
-        elif not quiet:
-            print(told(job.record), flush=True)
+        answer(job.summary, lambda: told(job.record), as_json=as_json, quiet=quiet)
     if not job.relaxation.converged:
         say(f"did not converge: {job.relaxation.message}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)
@@ -142,8 +138,5 @@ def plot(
             "title": title,
         }
         facts = plot_file(file, frame=frame, kind=kind, out=out, dpi=dpi, options=options)
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            size = f"{facts['width_mm']:.0f} by {facts['height_mm']:.0f} mm"
-            print(f"written   {facts['picture']} ({size})", flush=True)
+        size = f"{facts['width_mm']:.0f} by {facts['height_mm']:.0f} mm"
+        answer(facts, lambda: f"written   {facts['picture']} ({size})", as_json=as_json, quiet=quiet)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
 
-from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, signals
+from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, signals
 from warpedfoam.cli.examples import epilog
 from warpedfoam.cli.flags import Color, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet
 from warpedfoam.cli.progress import progress_bars
@@ -78,10 +77,7 @@ def drift(
                 color_by=color_by,
                 progress=report,
             )
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            print(job.summary_text(facts), flush=True)
+        answer(facts, lambda: job.summary_text(facts), as_json=as_json, quiet=quiet)
     if not facts["completed"]:
         raise typer.Exit(NOT_CONVERGED)
 

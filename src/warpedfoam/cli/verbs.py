@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
+from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import epilog
 from warpedfoam.cli.flags import OUTPUT, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet, Seed
 from warpedfoam.cli.progress import progress_bars
@@ -189,10 +189,8 @@ def view(
         from warpedfoam.cli.viewing import view_files
 
         path, facts = view_files(files, out=out, color_by=color_by, title=title)
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            print(f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser", flush=True)
+        written = f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser"
+        answer(facts, lambda: written, as_json=as_json, quiet=quiet)
 
 
 @verbs.command(epilog=epilog("ensemble"))
@@ -219,10 +217,7 @@ def ensemble(
 
         with progress_bars(quiet=quiet) as report:
             facts = run_file(file, out, sets or [], workers=workers, scheduler=scheduler, progress=report)
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            print(ensemble_text(facts), flush=True)
+        answer(facts, lambda: ensemble_text(facts), as_json=as_json, quiet=quiet)
     bad = {state: n for state, n in facts["counts"].items() if n and state != "converged"}
     if bad:
         counts = ", ".join(f"{n} of {facts['runs']} runs {state}" for state, n in bad.items())
@@ -264,10 +259,7 @@ def partition(
                 picture=picture,
                 progress=report,
             )
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            print(job.summary_text(facts), flush=True)
+        answer(facts, lambda: job.summary_text(facts), as_json=as_json, quiet=quiet)
 
 
 @verbs.command(epilog=epilog("cluster"))
@@ -323,10 +315,7 @@ def cluster(
                 picture=picture,
                 progress=report,
             )
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            print(job.summary_text(facts), flush=True)
+        answer(facts, lambda: job.summary_text(facts), as_json=as_json, quiet=quiet)
     if not facts["converged"]:
         say(f"did not converge: {facts['message']}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)

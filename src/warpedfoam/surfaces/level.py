@@ -19,6 +19,7 @@ from warpedfoam.kernels.loops import Loops
 from warpedfoam.kernels.nodal import bump_offsets
 from warpedfoam.kernels.periodic import loop_shifts, nearest_image
 from warpedfoam.kernels.quadrature import lobatto
+from warpedfoam.kernels.shapes import bent_mean_gauss, mean_gauss, normal_shape
 from warpedfoam.kernels.thinning import accepted
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.patches import PatchedMesh, Quadrature
@@ -187,7 +188,7 @@ class LevelSurface(ABC):
         """Normals (n, 3) and shape operators (n, 3, 3) at points of the surface."""
         _, gradient, second = self.level(points, second=True)
         assert second is not None
-        return _normal_shape(gradient, second)
+        return normal_shape(gradient, second)
 
     def _shape_slopes(self, points: Floats, normals: Floats) -> Floats:
         """∂_a W along the surface at points (…, 3) of it, (…, 3, 3, 3), by central differences."""
@@ -202,7 +203,7 @@ class LevelSurface(ABC):
         """Where lines from near points meet the surface, normals and shape operators there."""
         found, gradient, second = self._landed(points, axes, second=True)
         assert second is not None
-        return found, *_normal_shape(gradient, second)
+        return found, *normal_shape(gradient, second)
 
     def _landed(self, points: Floats, axes: Floats, *, second: bool) -> tuple[Floats, Floats, Floats | None]:
         """Where lines from near points meet the surface, to about 1e-9; ∇f and ∇²f there.
@@ -238,14 +239,14 @@ class LevelSurface(ABC):
     def principal_curvatures(self, points: ArrayLike) -> Floats:
         """Eigenvalues of W in the tangent plane, the larger one first."""
         _, shape = self._shape(self.project(points))
-        mean, gauss = _mean_gauss(shape)
+        mean, gauss = mean_gauss(shape)
         root = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
         return np.stack([mean + root, mean - root], axis=1)
 
     def gaussian_curvature(self, points: ArrayLike) -> Floats:
         """G = k1 k2."""
         _, shape = self._shape(self.project(points))
-        return _mean_gauss(shape)[1]
+        return mean_gauss(shape)[1]
 
     def shape_operators(self, points: ArrayLike, *, project: bool = True) -> Floats:
         """W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|; without ``project`` that of the level set through each point."""
@@ -266,7 +267,7 @@ class LevelSurface(ABC):
     def _moments(self) -> tuple[float, float, float, float, float]:
         """∫ dA, ∫ H dA, ∫ G dA, and the range of the principal curvatures."""
         rule = self._patches.quadrature()
-        mean, gauss = _mean_gauss(rule.shapes)
+        mean, gauss = mean_gauss(rule.shapes)
         weights = rule.weights
         root = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
         return (
@@ -282,7 +283,7 @@ class LevelSurface(ABC):
         if layer.profile is None:
             return float(np.dot(layer.steiner, self._moments[:3]))
         rule = self.quadrature()
-        return float(rule.weights @ layer.density(rule.points, *_mean_gauss(rule.shapes)))
+        return float(rule.weights @ layer.density(rule.points, *mean_gauss(rule.shapes)))
 
     def curvature_range(self) -> tuple[float, float]:
         """Least and greatest principal curvature on a fine mesh."""
@@ -406,7 +407,7 @@ class LevelSurface(ABC):
         moves = arcs.jacobians(placed, normals, shapes, frames)
         second = jump is not None
         across = (layer.heights, layer.shares)
-        mean, gauss = _mean_gauss(shapes)
+        mean, gauss = mean_gauss(shapes)
         if layer.profile is None:
             value, gradient, hessian = arcs.film_terms(placed, normals, shapes, moves, *across, second=second)
         else:
@@ -456,7 +457,7 @@ class LevelSurface(ABC):
             normal = gradient / size[:, None]
             if second is None:
                 return normal, np.full(len(points), c0)
-            return normal, layer.density(at, *_mean_gauss_of(normal, second / size[:, None, None]))
+            return normal, layer.density(at, *bent_mean_gauss(normal, second / size[:, None, None]))
 
         back = (loops.halves & 1).astype(bool)[:, None]
         first, last = placed.points[0][loops.halves >> 1], placed.points[-1][loops.halves >> 1]
@@ -467,32 +468,6 @@ class LevelSurface(ABC):
         if self.rim is not None:
             points, loops = with_walls(self.rim, placed.rule, points, loops, start, end)
         return fan_integrals(placed.rule, points, loops, shifts, self.foot, land, self._unit, rays)
-
-
-def _normal_shape(gradient: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """n = ∇f/|∇f| and W = (I − nnᵀ) ∇²f (I − nnᵀ)/|∇f|."""
-    size = np.linalg.norm(gradient, axis=1)
-    normal = gradient / size[:, None]
-    bent = np.einsum("nxy,ny->nx", second, normal)
-    shape = second - normal[:, :, None] * bent[:, None] - bent[:, :, None] * normal[:, None]
-    shape += np.einsum("nx,nx->n", normal, bent)[:, None, None] * (normal[:, :, None] * normal[:, None])
-    return normal, shape / size[:, None, None]
-
-
-def _mean_gauss_of(normal: Floats, bend: Floats) -> tuple[Floats, Floats]:
-    """H and G from n and B = ∇²f/|∇f|: tr W = tr B − nᵀBn, tr W² = tr B² − 2 |Bn|² + (nᵀBn)²."""
-    bent = np.einsum("nxy,ny->nx", bend, normal)
-    across = np.einsum("nx,nx->n", normal, bent)
-    trace = np.einsum("nxx->n", bend) - across
-    square = np.einsum("nxy,nxy->n", bend, bend) - 2.0 * np.einsum("nx,nx->n", bent, bent) + across**2
-    return 0.5 * trace, 0.5 * (trace**2 - square)
-
-
-def _mean_gauss(shape: Floats) -> tuple[Floats, Floats]:
-    """H and G of shape operators (…, 3, 3) whose third eigenvalue, along the normal, is 0."""
-    trace = np.einsum("...xx->...", shape)
-    square = np.einsum("...xy,...xy->...", shape, shape)
-    return 0.5 * trace, 0.5 * (trace**2 - square)
 
 
 def _spread_out(points: Floats, count: int, spacing: float, period: Floats | None) -> Ints:
