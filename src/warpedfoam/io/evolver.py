@@ -12,6 +12,7 @@ from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, atomic_text, writable_path
 from warpedfoam.io.evolver_forms import rest_of
 from warpedfoam.io.evolver_formulas import Formulas, formulas_of
+from warpedfoam.io.evolver_levels import level_formulas, level_tree
 from warpedfoam.io.evolver_sheets import sheets
 from warpedfoam.io.evolver_strings import strings
 
@@ -104,7 +105,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     if odd.any():
         bad = int(np.argmax(odd))
         raise ValueError(f"foam must consist of disks, but bubble {bad} is none: its volume is no one-form")
-    formulas = formulas_of(foam, ruled=kind != "string")
+    tree, ruled = level_tree(foam.cell.surface), kind != "string"
+    formulas = formulas_of(foam, ruled=ruled) if tree is None else level_formulas(foam, tree, ruled=ruled)
     if kind == "soapfilm" and (formulas.outer is None or formulas.flux is None):
         raise ValueError(
             f"the soapfilm model needs a formula of the outer plate, which is none over a "
@@ -145,8 +147,9 @@ def _head(foam: Foam, formulas: Formulas, model: str) -> Iterable[str]:
         yield "formula: side[1]*x + side[2]*y + side[3]*z = side[4]"
     extra = [equation for equation, _ in formulas.rims]
     extra += [
-        " + ".join(f"({a!r})*{e}" for a, e in zip(normal.tolist(), "xyz", strict=True)) + " = 0"
-        for _, normal in formulas.pinned
+        " + ".join(f"({a!r})*{e}" for a, e in zip(normal.tolist(), "xyz", strict=True))
+        + f" = {float(normal @ foam.vertex_points[vertex])!r}"
+        for vertex, normal in formulas.pinned
     ]
     for place, equation in enumerate(extra):
         yield from (f"constraint {place + 3}", f"formula: {equation}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +52,7 @@ class Formulas:
     fixed : tuple of int
         Vertices kept in place, which hold translations or rotations back.
     pinned : tuple of (int, (3,) array)
-        Vertices kept on a plane through the origin, by its normal.
+        Vertices kept on the plane through where they are, by its normal.
     rims : tuple of (str, tuple of int)
         Equations of the rim's loops, and the vertices on each.
     """
@@ -91,17 +91,18 @@ def formulas_of(foam: Foam, *, ruled: bool) -> Formulas:
     names = sorted(kind.__name__ for kind in makers)
     raise ValueError(
         f"foam must lie on a {', '.join(names[:-1])} or {names[-1]}, got {type(surface).__name__}: "
-        "the Evolver needs the surface and its volumes as formulas"
+        "the Evolver needs the surface and its volumes as formulas; a Graph, Implicit or Revolution has them "
+        "if it is made by from_formula"
     )
 
 
-def _layers(foam: Foam, ruled: bool) -> tuple[float, float, float]:
+def layers(foam: Foam, ruled: bool) -> tuple[float, float, float]:
     """c0, c1, c2 of ∫ (c0 + c1 H + c2 G) dA, H the mean of the principal curvatures' sum."""
     d = foam.cell.mean_gap
     return (d, d**2, d**3 / 3.0) if ruled else (d, 0.0, 0.0)
 
 
-def _ruled(foam: Foam, squares: Callable[[float], str]) -> str:
+def ruled_films(foam: Foam, squares: Callable[[float], str]) -> str:
     """γ Σ_t w_t √(|(I + tW) T|²), by the square at each height."""
     heights, shares = gauss(foam.cell.n_heights)
     d = foam.cell.mean_gap
@@ -111,10 +112,11 @@ def _ruled(foam: Foam, squares: Callable[[float], str]) -> str:
     )
 
 
-def _levelled(slope: Triple, bend: Triple) -> Callable[[float], str]:
-    """|(I + tW) T|² on a level set f = 0: WT = (BT − n n·BT)/|∇f|, B = diag(f_xx, f_yy, f_zz)."""
+def levelled(slope: Triple, bend: Sequence[Triple]) -> Callable[[float], str]:
+    """|(I + tW) T|² on a level set f = 0: WT = (BT − n n·BT)/|∇f|, B the second derivatives of f."""
     size = f"({slope[0]}^2 + {slope[1]}^2 + {slope[2]}^2)"
-    bt = [f"({b}*x{k + 4})" for k, b in enumerate(bend)]
+    parts = [[f"{b}*x{k + 4}" for k, b in enumerate(row) if b != "0"] for row in bend]
+    bt = [f"({' + '.join(row)})" if row else "0" for row in parts]
     along = " + ".join(f"x{k + 4}*{part}" for k, part in enumerate(bt))
     square = " + ".join(f"{part}^2" for part in bt)
     up = f"({' + '.join(f'{n}*{part}' for n, part in zip(slope, bt, strict=True))})"
@@ -123,6 +125,11 @@ def _levelled(slope: Triple, bend: Triple) -> Callable[[float], str]:
         f"x4^2 + x5^2 + x6^2 + {number(2.0 * t)}*({along})/sqrt({size})"
         f" + {number(t * t)}*({square} - {up}^2/{size})/{size}"
     )
+
+
+def diagonal(a: str, b: str, c: str) -> tuple[Triple, Triple, Triple]:
+    """Second derivatives that do not mix."""
+    return (a, "0", "0"), ("0", b, "0"), ("0", "0", c)
 
 
 def _sphere(foam: Foam, ruled: bool) -> Formulas:
@@ -210,7 +217,7 @@ def _torus(foam: Foam, ruled: bool) -> Formulas:
         surface=f"(sqrt(x^2 + y^2) - {ring!r})^2 + z^2 = {tube**2!r}",
         outer=f"(sqrt(x^2 + y^2) - {ring!r})^2 + z^2 = {(tube + d) ** 2!r}",
         tension=0.0 if ruled else foam.tension * d,
-        energy=_ruled(foam, squares) if ruled else None,
+        energy=ruled_films(foam, squares) if ruled else None,
         one_form=one_form,
         flux=flux,
         volume=4.0 * np.pi**2 * flat,
@@ -239,7 +246,7 @@ def _cylinder(foam: Foam, ruled: bool) -> Formulas:
         surface=f"x^2 + y^2 = {r**2!r}",
         outer=f"x^2 + y^2 = {(r + d) ** 2!r}",
         tension=0.0 if ruled else foam.tension * d,
-        energy=_ruled(foam, squares) if ruled else None,
+        energy=ruled_films(foam, squares) if ruled else None,
         one_form=lambda place: ("0", "0", f"{number(share)}*{theta(place)}"),
         flux=lambda place: axis_flux(theta(place)),
         volume=2.0 * np.pi * share * tube.height,
@@ -255,7 +262,7 @@ def _catenoid(foam: Foam, ruled: bool) -> Formulas:
     waist = foam.cell.surface
     assert isinstance(waist, Catenoid)
     a, half = waist.neck_radius, 0.5 * waist.height
-    c0, _, c2 = _layers(foam, ruled)
+    c0, _, c2 = layers(foam, ruled)
     about = round_axis(foam.bubble_centres)
     refuse(foam, films_cross(foam, round_axis(samples(foam)), about), "reaches round the axis")
     cosh = f"cosh(z/{number(a)})"
@@ -267,7 +274,7 @@ def _catenoid(foam: Foam, ruled: bool) -> Formulas:
         surface=f"x^2 + y^2 - {number(a**2)}*{cosh}^2 = 0",
         outer=None,
         tension=0.0 if ruled else foam.tension * foam.cell.mean_gap,
-        energy=_ruled(foam, _levelled(("x1", "x2", steep), ("1", "1", bent))) if ruled else None,
+        energy=ruled_films(foam, levelled(("x1", "x2", steep), diagonal("1", "1", bent))) if ruled else None,
         one_form=lambda place: ("0", "0", f"{turned_angle(about[place], 'y', 'x')}*{width}"),
         flux=None,
         volume=c0 * area - c2 * 4.0 * np.pi * np.tanh(half / a),
@@ -285,7 +292,7 @@ def _ellipsoid(foam: Foam, ruled: bool) -> Formulas:
     egg = foam.cell.surface
     assert isinstance(egg, Ellipsoid)
     axes = np.array([egg.a, egg.b, egg.c])
-    c0, c1, c2 = _layers(foam, ruled)
+    c0, c1, c2 = layers(foam, ruled)
     middles, along = foam.bubble_centres, samples(foam)
     far = np.zeros(foam.n_bubbles, dtype=bool)
     for bubble in (foam.network.left, foam.network.right):
@@ -307,7 +314,7 @@ def _ellipsoid(foam: Foam, ruled: bool) -> Formulas:
     density = f"{density}*sqrt({p})/{q}^2"
     slope = tuple(f"({number(s**-2.0)}*x{k + 1})" for k, s in enumerate(axes))
     bend = tuple(number(s**-2.0) for s in axes)
-    squares = _levelled((slope[0], slope[1], slope[2]), (bend[0], bend[1], bend[2]))
+    squares = levelled((slope[0], slope[1], slope[2]), diagonal(*bend))
     fixed: tuple[int, ...] = ()
     pinned: tuple[tuple[int, Floats], ...] = ()
     alike = [abs(axes[k - 1] - axes[k - 2]) < 1e-9 * egg.size for k in range(3)]
@@ -321,7 +328,7 @@ def _ellipsoid(foam: Foam, ruled: bool) -> Formulas:
         surface=" + ".join(f"{number(s**-2.0)}*{e}^2" for s, e in zip(axes, "xyz", strict=True)) + " = 1",
         outer=None,
         tension=0.0 if ruled else foam.tension * foam.cell.mean_gap,
-        energy=_ruled(foam, squares) if ruled else None,
+        energy=ruled_films(foam, squares) if ruled else None,
         one_form=lambda place: along_rays(middles[place], density),
         flux=None,
         volume=foam.cell.volume if ruled else foam.cell.mean_gap * egg.area,
