@@ -60,6 +60,14 @@ def with_pressures(foam: Foam) -> Foam:
     )
 
 
+def resized(foam: Foam, scale: float) -> Foam:
+    """A foam on a sphere, all lengths times ``scale``."""
+    assert isinstance(foam.cell.surface, Sphere)
+    cell = HeleShawCell(Sphere(foam.cell.surface.radius * scale), foam.cell.mean_gap * scale)
+    pressures = None if foam.pressures is None else foam.pressures / scale
+    return Foam(cell, foam.network, foam.vertex_points * scale, foam.film_offsets, pressures=pressures)
+
+
 def lone_bubble(height: float = 0.8) -> Foam:
     """A round bubble at the north pole of the unit sphere, and the rest of the sphere."""
     rho = np.sqrt(1.0 - height**2)

@@ -16,7 +16,7 @@ from warpedfoam.io.patches import bubble_patches, film_points, loop_points
 from warpedfoam.io.scalars import bubble_scalars, film_scalars
 from warpedfoam.io.state import arrays_of
 
-from .io_foams import bubble_on_torus, lone_bubble, sphere_foam, torus_foam, with_pressures
+from .io_foams import bubble_on_torus, lone_bubble, resized, sphere_foam, torus_foam, with_pressures
 from .other_readers import READERS, Seen, with_prefix
 
 FOAMS: dict[str, Callable[[], wf.Foam]] = {
@@ -24,6 +24,8 @@ FOAMS: dict[str, Callable[[], wf.Foam]] = {
     "torus": torus_foam,
     "lone": lone_bubble,
     "open": bubble_on_torus,
+    "tiny": lambda: resized(with_pressures(sphere_foam(12)), 1e-9),
+    "huge": lambda: resized(with_pressures(sphere_foam(12)), 1e9),
     "flat": lambda: wf.voronoi_foam(wf.HeleShawCell(wf.FlatTorus(4.0, 3.0), 0.1), 20, seed=1),
 }
 CURVE = 5

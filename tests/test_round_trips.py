@@ -10,7 +10,7 @@ import pytest
 
 import warpedfoam as wf
 
-from .io_foams import bubble_on_torus, lone_bubble
+from .io_foams import bubble_on_torus, lone_bubble, resized, sphere_foam
 from .test_io_files import _same
 from .test_view import repeating, rimmed
 
@@ -76,6 +76,24 @@ def test_polygons(tmp_path: Path, name: str, ending: str) -> None:
     assert again.exterior == one.exterior
     assert again.energy == pytest.approx(one.energy, rel=1e-12)
     np.testing.assert_allclose(again.bubble_volumes, one.bubble_volumes, rtol=1e-10)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
+def test_sizes_from_nanometres_to_planets(tmp_path: Path, scale: float) -> None:
+    """No format loses a digit, whatever the unit; the energies scale with the area."""
+    one = resized(sphere_foam(12), scale)
+    assert one.energy == pytest.approx(scale**2 * sphere_foam(12).energy, rel=1e-13)
+    with wf.TrajectoryWriter(tmp_path / "f.h5") as writer:
+        writer.append(one)
+    with wf.Trajectory(tmp_path / "f.h5") as frames:
+        again = [frames[0]]
+    again.append(wf.load(wf.save(tmp_path / "f.npz", one)))
+    again.append(wf.read_vtp(wf.write_vtp(tmp_path / "f.vtp", one)))
+    assert all(_same(other, one) for other in again)
+    for path in (wf.write_ply(tmp_path / "f.ply", one)[0], wf.write_obj(tmp_path / "f.obj", one)):
+        other = wf.import_polygons(path, one.cell)
+        assert other.energy == pytest.approx(one.energy, rel=1e-12)
+        np.testing.assert_array_equal(other.network.sides, one.network.sides)
 
 
 def test_pictures_of_surfaces_that_no_file_holds(tmp_path: Path) -> None:

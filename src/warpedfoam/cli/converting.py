@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 
 from warpedfoam import io
 from warpedfoam.foam import Foam
+from warpedfoam.io.atomic import writable_path
 
 #: By ending: how a foam is written, and what the file is for.
 WRITERS: dict[str, tuple[Callable[..., Any], str]] = {
@@ -147,14 +149,17 @@ def info(file: str, *, frame: int) -> tuple[str, dict[str, Any]]:
 
 def _trajectory(path: str, foam: Foam) -> Path:
     """A trajectory of one frame in place of what is there, whole or not at all."""
-    target = Path(path)
+    target = writable_path(path)
     part = target.with_name(f".{target.stem}.{secrets.token_hex(6)}{target.suffix}")
     try:
         with io.TrajectoryWriter(part) as writer:
             writer.append(foam)
         os.replace(part, target)
-    except BaseException:
-        part.unlink(missing_ok=True)
+    except BaseException as fault:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        if isinstance(fault, OSError) and fault.errno is not None:
+            raise OSError(fault.errno, fault.strerror, str(target)) from None
         raise
     return target
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import shutil
@@ -100,9 +101,39 @@ def atomic_binary(path: PathLike) -> Iterator[BinaryIO]:
         yield cast(BinaryIO, stream)
 
 
+def room_for(path: Path, count: int) -> None:
+    """Let the disk say now, not in the middle of a file, that it does not take ``count`` bytes more.
+
+    Raises
+    ------
+    OSError
+        If it is full.
+    """
+    try:
+        if not hasattr(os, "posix_fallocate"):
+            if shutil.disk_usage(path.parent).free < count:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return
+        temporary = _beside(path)
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        try:
+            os.posix_fallocate(descriptor, 0, count)
+        finally:
+            os.close(descriptor)
+            temporary.unlink(missing_ok=True)
+    except OSError as fault:
+        raise named(fault, path) from None
+
+
+def _beside(target: Path) -> Path:
+    """A name for a temporary file in the same folder."""
+    return target.with_name(f".{target.name[:200]}.{secrets.token_hex(6)}.part")
+
+
 def named(fault: BaseException, target: Path) -> BaseException:
-    """The fault; one of the system's that names no file, such as a full disk, with the file's name."""
-    if isinstance(fault, OSError) and fault.errno is not None and fault.filename is None:
+    """The fault; one of the system's that names no file or a temporary one, with the file's name."""
+    other = isinstance(fault, OSError) and (fault.filename is None or str(fault.filename).endswith(".part"))
+    if isinstance(fault, OSError) and fault.errno is not None and other:
         return OSError(fault.errno, fault.strerror, str(target)).with_traceback(fault.__traceback__)
     return fault
 
@@ -110,9 +141,13 @@ def named(fault: BaseException, target: Path) -> BaseException:
 @contextmanager
 def _replacing(target: Path, mode: str) -> Iterator[IO[str] | IO[bytes]]:
     target = target.resolve()  # through a link, so that the link stays one
-    temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(6)}.part")
+    temporary = _beside(target)
     # os.open rather than tempfile: the file gets the permissions of any new file here
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+    try:
+        descriptor = os.open(temporary, flags, 0o666)
+    except OSError as fault:
+        raise named(fault, target) from None
     try:
         text = mode == "w"
         with open(

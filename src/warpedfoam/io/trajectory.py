@@ -9,6 +9,7 @@ import secrets
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from warpedfoam.arrays import Floats, as_instance, as_integer, as_number, frozen
 from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
-from warpedfoam.io.atomic import PathLike, as_path, writable_path
+from warpedfoam.io.atomic import PathLike, as_path, room_for, writable_path
 from warpedfoam.io.hdf5_superblock import (
     SUPERBLOCK,
     USER_BLOCK,
@@ -48,6 +49,8 @@ _PURPOSE = "HDF5"
 #: The oldest HDF5 with a single-writer mode: what a newer one would write, older programs cannot open.
 LIBRARIES = ("v110", "v110")
 _CHUNK = 4096
+#: Bytes that a frame may take besides its own: a chunk of every array, and HDF5's index of them.
+_SLACK = (len(_DATA) + 2) * 8 * _CHUNK + (1 << 16)
 
 Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
@@ -149,13 +152,27 @@ class TrajectoryWriter:
             raise ValueError(
                 "foam must lie in the cell of the frames before it: same surface, gap and heights"
             )
-        if self._file is None:
-            if self._cell is not None:
-                raise ValueError("the writer is closed; open another with append=True")
-            self._file = _created(self._h5py, self.path, cell)
-        self._cell = cell
-        _put(self._file, arrays, moment)
+        if self._file is None and self._cell is not None:
+            raise ValueError("the writer is closed; open another with append=True")
+        # HDF5 ends the interpreter when the disk is full
+        room_for(self.path, _SLACK + 2 * sum(values.nbytes for values in arrays.values()))
+        try:
+            if self._file is None:
+                self._file = _created(self._h5py, self.path, cell)
+            self._cell = cell
+            _put(self._file, arrays, moment)
+        except (OSError, RuntimeError) as fault:  # what h5py makes of the library's faults
+            self._give_up()
+            raise OSError(f"cannot write {self.path}: {brief(fault)}") from fault
         self._count, self._time = self._count + 1, moment
+
+    def _give_up(self) -> None:
+        """Close what cannot be written; without a frame there is no file."""
+        with suppress(Exception):
+            self.close()
+        self._file = None
+        if not self._count:
+            self.path.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Close the file. Without a frame there is none."""
@@ -175,6 +192,7 @@ class TrajectoryWriter:
     def _go_on(self, target: Path) -> None:
         """Copy the frames that are there to a new file that takes the old one's place."""
         temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(6)}.part")
+        room_for(target, _SLACK + target.stat().st_size)
         with Trajectory(target) as old:
             self._cell = (old._header, old._surface)
             try:
@@ -240,7 +258,7 @@ class Trajectory:
                 return
             except Exception as fault:  # whatever a damaged file makes the library raise
                 self.close()
-                if look + 1 < LOOKS and is_open(self.path):
+                if look + 1 < LOOKS and _held(self.path):
                     # a copy taken while the writer was at it may be torn: the next is not
                     time.sleep(PAUSE)
                     continue
@@ -327,6 +345,14 @@ class Trajectory:
         if not json.loads(out["header"].tobytes())["pressures"]:
             del out["pressures"]
         return {**out, **self._surface}
+
+
+def _held(path: Path) -> bool:
+    """Whether it says that a writer holds it."""
+    try:
+        return is_open(path)
+    except FileFormatError:
+        return False
 
 
 def _created(h5py: Any, path: Path, cell: tuple[str, Arrays]) -> Any:
