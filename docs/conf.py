@@ -23,6 +23,7 @@ extensions = [
     "command_pages",
     "gallery_pages",
     "name_links",
+    "formulas",
 ]
 root_doc = "index"
 exclude_patterns = ["_build", "_ext", "pictures"]

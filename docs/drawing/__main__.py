@@ -1,8 +1,8 @@
 """Draw the pictures of the documentation anew: ``python3 run.py gallery [NAMES or GROUPS]``.
 
-Groups are concepts, examples, guides and accuracy; names are those of the files. Without arguments everything
-is drawn, which takes some minutes. The accuracy plots come from the tables in benchmarks/data, which the
-benchmarks write; nothing is measured here.
+Groups are concepts, examples, howtos, guides and accuracy; names are those of the files. Without arguments
+everything is drawn, which takes some minutes. The accuracy plots come from the tables in benchmarks/data,
+which the benchmarks write; nothing is measured here.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import accuracy
 import concepts
 import examples
 import guides
+import howtos
 from PIL import Image
 
 WIDEST = 1000
@@ -30,6 +31,7 @@ def jobs() -> dict[str, dict[str, Callable[[], None]]]:
             f"concept_{name}": partial(concepts.draw, DOCS / "pictures", [name]) for name in concepts.PICTURES
         },
         "examples": {f"example_{name}": draw for name, draw in examples.PICTURES.items()},
+        "howtos": {f"howto_{name}": partial(howtos.draw, name, DOCS) for name in howtos.PICTURES},
         "guides": {name: partial(draw, DOCS / f"{name}.png") for name, draw in guides.PICTURES.items()},
         "accuracy": {name: partial(draw, DOCS / f"{name}.png") for name, draw in accuracy.PICTURES.items()},
     }
