@@ -49,14 +49,14 @@ def test_a_drift_on_a_column(moved: wf.Drift) -> None:
 
 
 def test_the_view_sees_every_bubble(moved: wf.Drift) -> None:
-    from warpedfoam.plot.drift_picture import _towards
+    from warpedfoam.plot.painting import cluster_view
     from warpedfoam.plot.projection import View
 
-    view = _towards(moved.foams)
+    view = cluster_view(moved.foams)
     assert view is not None
     depth = View.from_angles(*view).project(PAPER.normals(moved.centres[:, 0]))[:, 2]
     assert depth.min() > 0.1
-    assert _towards([sphere_grains()]) is None
+    assert cluster_view([sphere_grains()]) is None
 
 
 def test_frames_can_be_chosen(moved: wf.Drift) -> None:

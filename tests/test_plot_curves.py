@@ -16,6 +16,8 @@ from warpedfoam import (
     Sphere,
     Torus,
     anneal,
+    bond_order,
+    cluster_foam,
     equilibrium_report,
     foam_statistics,
     geometric_potential,
@@ -38,6 +40,9 @@ from warpedfoam import (
     save_figure,
     voronoi_foam,
 )
+from warpedfoam.io.patches import bubble_patches
+from warpedfoam.plot.painting import default_view
+from warpedfoam.plot.projection import View
 from warpedfoam.plot.style import Style
 
 from .io_foams import bubble_on_torus, sphere_foam, torus_foam, with_pressures
@@ -74,6 +79,54 @@ def test_the_history_ends_in_the_result() -> None:
     for array in vars(history).values():
         assert len(array) == len(history.iteration)
         assert not array.flags.writeable
+
+
+def test_no_t1s_are_a_line_on_the_ground() -> None:
+    one = relax(sphere_foam(12, even=True), t1=False)
+    right = plot_relaxation(one).axes[2]
+    assert right.get_ylim()[0] > -0.1
+    assert right.get_ylim()[1] >= 1.0
+
+
+@pytest.mark.parametrize("values", [120.0 + 1e-3 * np.arange(40.0), -7.0 - 2e-5 * np.arange(30.0) ** 2])
+def test_values_that_differ_by_little_are_shown_less_a_number(values: np.ndarray) -> None:
+    """Bars and mean are where they were, once what the axis says is added; no offset stands beside it."""
+    axes = plot_histogram(values, label="angle", width=86.0).axes[0]
+    said = re.fullmatch(r"angle ([−+]) ([\d.]+)", axes.get_xlabel())
+    assert said is not None
+    shift = float(said[2]) * (1.0 if said[1] == "−" else -1.0)
+    left = axes.patches[0].get_x() + shift
+    assert left == pytest.approx(values.min(), rel=1e-12)
+    assert axes.lines[0].get_xdata()[0] + shift == pytest.approx(values.mean(), rel=1e-12)
+    assert f"mean {values.mean():.4g}" in axes.get_title()
+    axes.figure.draw_without_rendering()
+    assert axes.xaxis.get_offset_text().get_text() == ""
+    assert plot_histogram(np.arange(40.0), label="angle").axes[0].get_xlabel() == "angle"
+
+
+def test_equal_areas_have_no_slope_of_lewis() -> None:
+    found = relax(voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), n_bubbles=20, seed=1)).foam
+    axes = plot_sides(foam_statistics(found)).axes[2]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["measured", "all areas equal"]
+    assert axes.get_ylim() == (0.9, 1.1)
+
+
+def test_an_exterior_is_grey_and_no_bubble() -> None:
+    foam = cluster_foam(HeleShawCell(Torus(3.0, 1.2), 0.1), 3, volumes=0.1, centre=[0.0, -4.2, 0.0])
+    order, kinds = plot_order(foam), plot_defects(foam)
+    assert order.axes[0].get_title().startswith("3 bubbles, mean")
+    assert kinds.axes[0].get_title().startswith("3 bubbles, ")
+    inside = np.delete(bond_order(foam).magnitude, foam.exterior)
+    assert order.axes[0].get_title().endswith(f"{inside.mean():.3f}")
+    fills = order.axes[0].collections[0].get_facecolors()[:, :3]
+    # most of the torus is grey of some brightness
+    assert (np.ptp(fills, axis=1) < 1e-9).mean() > 0.5
+    # the cluster is seen from its front
+    patches = bubble_patches(foam, curve_points=9, rings=3)
+    elevation, azimuth = default_view(foam, patches)
+    held = np.delete(foam.bubble_centres, foam.exterior, axis=0)
+    towards = View.from_angles(elevation, azimuth).project(foam.cell.surface.normals(held))[:, 2]
+    assert towards.min() > 0.7
 
 
 def test_t1s_are_counted_by_the_step_that_made_them() -> None:

@@ -14,6 +14,9 @@ from warpedfoam.plot.style import BLUE, GREEN, GREY, ORANGE, PANEL, Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Mean areas, as shares of all, that differ by less are equal.
+EQUAL = 1e-9
+
 
 def plot_sides(statistics: FoamStatistics, *, width: float | None = None) -> Figure:
     """Histogram of sides with μ₂; mean sides of neighbours; mean areas: the laws of Aboav–Weaire and Lewis.
@@ -42,11 +45,16 @@ def plot_sides(statistics: FoamStatistics, *, width: float | None = None) -> Fig
     middle.legend(frameon=False, fontsize=style.small)
     style.dress(middle, "sides n", "n · m(n)", "mean sides m(n) of neighbours")
     right.plot(s.sides, s.area_by_sides, "o", color=BLUE, label="measured")
-    if s.lewis is not None:
+    if np.ptp(s.area_by_sides) < EQUAL:
+        # round-off has no slope
+        right.set_ylim(0.9, 1.1)
+        right.axhline(1.0, color=ORANGE, label="all areas equal")
+    elif s.lewis is not None:
         law = 1.0 + s.lewis * (s.sides - s.mean_sides)
         right.plot(s.sides, law, "-", color=ORANGE, label=f"Lewis, slope {s.lewis:.3g}")
     right.legend(frameon=False, fontsize=style.small)
     style.dress(right, "sides n", "mean area / that of all", "areas")
+    right.ticklabel_format(axis="y", useOffset=False)
     for axes in (left, middle, right):
         axes.set_xticks(s.sides)
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 from warpedfoam.analysis import BondOrder, DefectReport, bond_order, defects
 from warpedfoam.arrays import Bools, Floats, Ints, as_instance, frozen
 from warpedfoam.foam import Foam
-from warpedfoam.io.colours import BubbleColours, as_rgb, bubble_colours, ramp_rgb
+from warpedfoam.io.colours import OUTSIDE_COLOUR, BubbleColours, as_rgb, bubble_colours, ramp_rgb
 from warpedfoam.plot.foam_picture import painted_foam
 from warpedfoam.plot.legends import counted_sides, explain, put_legend
 from warpedfoam.plot.painting import Strokes
@@ -73,7 +73,7 @@ def plot_defects(
     colours = bubble_colours(foam, "charge")
     if title is None:
         title = (
-            f"{foam.n_bubbles} bubbles, {len(found.disclinations.charge)} of them charged; "
+            f"{_held(foam)} bubbles, {len(found.disclinations.charge)} of them charged; "
             f"total charge {found.total_charge}"
         )
     painted = painted_foam(
@@ -125,16 +125,21 @@ def plot_order(
         raise ValueError(f"order is of {len(found.psi6)} bubbles, the foam has {foam.n_bubbles}")
     values = found.magnitude
     inside = foam.network.bubble_euler == 1
+    if foam.exterior is not None:
+        inside[foam.exterior] = False
+    rgb = ramp_rgb(values, (0.0, 1.0))
+    rgb[~inside] = as_rgb(OUTSIDE_COLOUR)
     colours = BubbleColours(
         "order",
         "hexatic order |ψ6|",
         frozen(values),
-        frozen(ramp_rgb(values, (0.0, 1.0))),
+        frozen(rgb),
         (0.0, 1.0),
         inside,
     )
     if title is None:
-        title = f"{foam.n_bubbles} bubbles, mean |ψ6| {found.mean_magnitude:.3f}"
+        mean = found.mean_magnitude if inside.all() else float(values[inside].mean())
+        title = f"{_held(foam)} bubbles, mean |ψ6| {mean:.3f}"
     painted = painted_foam(
         foam,
         colours,
@@ -148,6 +153,11 @@ def plot_order(
     explain(painted.host(0), painted.axes, foam, colours, painted.style)
     painted.settle()
     return painted.figure
+
+
+def _held(foam: Foam) -> int:
+    """Number of bubbles, an exterior not counted."""
+    return foam.n_bubbles - (foam.exterior is not None)
 
 
 def outlines(foam: Foam, found: DefectReport) -> Strokes:
@@ -224,6 +234,6 @@ def kinds_legend(host: Figure | Axes, found: DefectReport, style: Style) -> None
             line = _WIDE * style.line
             handles.append(Line2D([], [], color=OUTLINES[name], linewidth=line, label=f"{name}:  {count}"))
         elif count:
-            handles.append(Line2D([], [], linestyle="none", label=f"{name}:  {count}"))
+            handles.append(Line2D([], [], linestyle="none", label=f"{name} (no outline):  {count}"))
     if handles:
         put_legend(host, handles, "clusters", style, "outside right lower", _ENTRY)

@@ -19,10 +19,9 @@ from warpedfoam.io.colours import bubble_colours
 from warpedfoam.io.patches import bubble_patches
 from warpedfoam.io.trajectory import Trajectory
 from warpedfoam.motion.result import Drift
-from warpedfoam.plot.painting import as_pair, default_view, paint_foam, resolution
+from warpedfoam.plot.painting import as_pair, cluster_view, default_view, paint_foam, resolution
 from warpedfoam.plot.projection import View
 from warpedfoam.plot.style import Style
-from warpedfoam.surfaces import Sphere
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
 
 #: Endings of animations, and the most frames of one.
 ENDINGS, MOST_FRAMES = (".gif", ".mp4"), 2000
-#: Directions that are tried for a view.
-DIRECTIONS = 4000
 #: Room round the bubbles in a close view, as a share of them; all is shown from a share of the whole on.
 MARGIN, WHOLE = 0.15, 0.7
 #: A first fall so many times as great as all that follows is cut off.
@@ -257,7 +254,7 @@ class _Stage:
         self._segments, self._rings = segments, rings
         patches = bubble_patches(first, curve_points=segments + 1, rings=rings)
         if view is None:
-            elevation, azimuth = _towards(foams) or default_view(first, patches)
+            elevation, azimuth = cluster_view(foams) or default_view(first, patches)
         else:
             elevation, azimuth = as_pair(view, "view")
         self._view = View.from_angles(elevation, azimuth)
@@ -283,24 +280,6 @@ class _Stage:
             low, high = self._box
             axes.set_xlim(low[0], high[0])
             axes.set_ylim(low[1], high[1])
-
-
-def _towards(foams: Sequence[Foam]) -> tuple[float, float] | None:
-    """Elevation and azimuth from which the bubbles of clusters are seen best, in all frames; or None."""
-    first = foams[0]
-    if first.exterior is None or first.cell.surface.period is not None:
-        return None
-    centres = np.concatenate([np.delete(foam.bubble_centres, first.exterior, axis=0) for foam in foams])
-    normals = first.cell.surface.normals(centres)
-    ways = Sphere(1.0).lattice_points(DIRECTIONS)
-    worst = (ways @ normals.T).min(axis=1)
-    if worst.max() <= 0.0:
-        return None
-    # of equally good ones the middle
-    best = ways[worst >= worst.max() - 0.02].mean(axis=0)
-    best /= np.linalg.norm(best)
-    elevation = float(np.degrees(np.arcsin(np.clip(best[2], -1.0, 1.0))))
-    return elevation, float(np.degrees(np.arctan2(best[1], best[0])))
 
 
 def _spread(drift: Drift) -> list[int]:

@@ -34,6 +34,8 @@ QUANTITIES: Mapping[str, tuple[str, str]] = {
 MOST_BARS = 60
 #: Values that differ by less than this share are one value.
 SAME = 1e-9
+#: By less than this share: they are shown less a number.
+CLOSE = 5e-3
 
 
 def plot_histogram(
@@ -94,10 +96,14 @@ def plot_histogram(
     known = values[np.isfinite(values)]
     if not known.size:
         raise ValueError("source has no number to show")
+    axis = axis if label is None else label
+    whole = bool((known == np.round(known)).all()) and np.ptp(known) <= MOST_BARS and count is None
+    shift = 0.0 if whole else _round_middle(known)
+    if shift:
+        known, axis = known - shift, f"{axis} − {shift:.10g}".replace("− -", "+ ")
     style = Style.of(width, 130.0)
     figure = style.figure(0.68 * style.width)
     axes = figure.add_subplot()
-    whole = bool((known == np.round(known)).all()) and np.ptp(known) <= MOST_BARS and count is None
     if whole:
         at, heights = np.unique(known, return_counts=True)
         q = at if quantity == "charge" else 6.0 - at
@@ -112,16 +118,14 @@ def plot_histogram(
     else:
         edges = _edges(known, count)
         axes.hist(known, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
-    mean, spread = float(known.mean()), float(known.std())
+    mean, deviation = float(known.mean()), float(known.std())
     # pressures have no mean but round-off
     mean = 0.0 if abs(mean) < 1e-12 * float(np.abs(known).max()) else mean
     axes.axvline(mean, color=ORANGE, linestyle="--", linewidth=1.4 * style.line)
     blank = len(values) - len(known)
     missing = f", {blank} blank" if blank else ""
-    heading = (
-        f"{len(known)} {counted}{missing}, mean {mean:.4g}, s.d. {spread:.3g}" if title is None else title
-    )
-    style.dress(axes, axis if label is None else label, f"number of {counted}", heading)
+    told = f"{len(known)} {counted}{missing}, mean {mean + shift:.4g}, s.d. {deviation:.3g}"
+    style.dress(axes, axis, f"number of {counted}", told if title is None else title)
     return figure
 
 
@@ -176,6 +180,14 @@ def _numbers(values: Any, name: str) -> Floats:
     except (TypeError, ValueError):
         raise TypeError(f"{name} must hold numbers") from None
     return out
+
+
+def _round_middle(known: Floats) -> float:
+    """A round number amid values that differ by little, which are shown less it; else 0."""
+    spread, size = float(np.ptp(known)), float(np.abs(known).max())
+    if not SAME * size < spread < CLOSE * size:
+        return 0.0
+    return float(np.round(np.median(known), max(-int(np.floor(np.log10(spread))) - 1, 0)))
 
 
 def _edges(known: Floats, count: int | None) -> Floats:

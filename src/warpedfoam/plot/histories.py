@@ -75,6 +75,7 @@ def plot_relaxation(relaxed: Relaxation, *, width: float | None = None) -> Figur
     for axes in (left, middle, right):
         _whole_numbers(axes.xaxis)
     _whole_numbers(right.yaxis)
+    right.set_ylim(-0.05 * max(one.n_t1, 1), 1.05 * max(one.n_t1, 1))
     return figure
 
 

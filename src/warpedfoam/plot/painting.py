@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from warpedfoam.foam import Foam
 from warpedfoam.io.colours import FILM_COLOUR, BubbleColours, as_rgb
 from warpedfoam.io.patches import Patches
 from warpedfoam.plot.projection import View, back_to_front, facing, shades
+from warpedfoam.surfaces import Sphere
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 _MOST_VECTORS = 20_000
 # Backs keep this share of their colour, the rest is this grey.
 BACK_SHARE, BACK_GREY = 0.25, 0.62
+#: Directions that are tried for a view of a cluster, and degrees by which it is seen from above and the side.
+DIRECTIONS, RAISED, SIDEWAYS = 4000, 20.0, 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +65,36 @@ def resolution(n_bubbles: int) -> tuple[int, int]:
 
 
 def default_view(foam: Foam, patches: Patches) -> tuple[float, float]:
-    """Elevation and azimuth in degrees: from the side and a little above, or from above what lies flat."""
+    """Elevation and azimuth in degrees: from the side and a little above, or from above what lies flat.
+
+    Clusters are seen from their front.
+    """
+    front = cluster_view([foam])
+    if front is not None:
+        # a little from above and from the side, so that the surface is seen to bend
+        return min(front[0] + RAISED, max(front[0], 90.0 - RAISED)), front[1] - SIDEWAYS
     if np.ptp(patches.points[:, 2]) <= 1e-9 * foam.cell.surface.size:
         return 90.0, -90.0
     low_and_flat = np.argmin(np.ptp(patches.points, axis=0)) == 2
     return (48.0, -60.0) if low_and_flat and foam.cell.surface.euler_characteristic <= 0 else (25.0, -60.0)
+
+
+def cluster_view(foams: Sequence[Foam]) -> tuple[float, float] | None:
+    """Elevation and azimuth from which the bubbles of clusters are seen best, in all frames; or None."""
+    first = foams[0]
+    if first.exterior is None or first.cell.surface.period is not None:
+        return None
+    centres = np.concatenate([np.delete(foam.bubble_centres, first.exterior, axis=0) for foam in foams])
+    normals = first.cell.surface.normals(centres)
+    ways = Sphere(1.0).lattice_points(DIRECTIONS)
+    worst = (ways @ normals.T).min(axis=1)
+    if worst.max() <= 0.0:
+        return None
+    # of equally good ones the middle
+    best = ways[worst >= worst.max() - 0.02].mean(axis=0)
+    best /= np.linalg.norm(best)
+    elevation = float(np.degrees(np.arcsin(np.clip(best[2], -1.0, 1.0))))
+    return elevation, float(np.degrees(np.arctan2(best[1], best[0])))
 
 
 def paint_foam(

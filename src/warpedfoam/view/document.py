@@ -244,7 +244,8 @@ def _first_view(foam: Foam, drawn: Geometry) -> dict[str, float]:
         first = int(foam.exterior == 0)
         x, y, z = foam.cell.surface.normals(foam.bubble_centres[first : first + 1])[0].tolist()
         elevation = float(np.degrees(np.arctan2(z, np.hypot(x, y))))
-        # a little from the side, so that the surface is seen to bend
+        # a little from above and from the side, so that the surface is seen to bend
+        elevation = min(elevation + 20.0, max(elevation, 70.0))
         return {"elevation": elevation, "azimuth": float(np.degrees(np.arctan2(y, x))) - 15.0}
     extent = np.ptp(drawn.points, axis=0)
     if extent[2] <= 1e-9 * foam.cell.surface.size:
