@@ -141,9 +141,6 @@ def coarsen(
                 picture=picture,
                 progress=report,
             )
-        if as_json:
-            print(json.dumps(facts, allow_nan=False), flush=True)
-        elif not quiet:
-            print(job.summary_text(facts), flush=True)
+        answer(facts, lambda: job.summary_text(facts), as_json=as_json, quiet=quiet)
     if not facts["completed"]:
         raise typer.Exit(NOT_CONVERGED)
