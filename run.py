@@ -111,8 +111,10 @@ def install(extra=""):
     if want in done or installed_for("[dev]") in done:  # which has all the others
         return
     say("installing warpedfoam%s and what it needs (once; takes a minute or two)" % extra)
-    # bytecode comes with the first import: most of what is installed is never imported
-    options = ["--quiet", "--disable-pip-version-check", "--no-compile"]
+    options = ["--quiet", "--disable-pip-version-check"]
+    if extra == "[dev]":
+        # tests import a small part of it, whose bytecode comes with the first import
+        options.append("--no-compile")
     done = subprocess.call([*pip_command(), "install", *options, "--editable", HERE + extra])
     if done != 0:
         fail("the installation failed; see above. A connection to a package index is needed the first time.")
@@ -142,6 +144,8 @@ def test(arguments):
     pytest = [PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", *ORDER, *arguments]
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    # tests start hundreds of interpreters: compiling everything anew would take each half a second more
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     slow = [("layers", [tool("lint-imports")]), ("mypy", [tool("mypy"), "--strict", "src"])]
     beside = [(name, *in_background(command)) for name, command in slow]
     failed = []

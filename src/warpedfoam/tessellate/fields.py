@@ -13,7 +13,7 @@ from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.places import Places
 from warpedfoam.tessellate.colouring import colour_seeds
 from warpedfoam.tessellate.domains import WHOLE, DividedHeat
-from warpedfoam.tessellate.geodesics import HeatGeodesics
+from warpedfoam.tessellate.geodesics import HeatGeodesics, factored
 
 #: Nearest seeds kept per node, and how far apart (in mean spacings) seeds of one colour lie.
 CANDIDATES, APART = 12, 4.5
@@ -46,9 +46,12 @@ class SeedFields:
 
 
 def heat_solver(mesh: TriangleMesh, t: float) -> HeatGeodesics | DividedHeat:
-    """What `seed_fields` measures with: the whole mesh factored once or, if it is large, domains of it."""
+    """What `seed_fields` measures with: the whole mesh factored once or, if it is large, domains of it.
+
+    Foams on the same mesh share what was factored for the last.
+    """
     if mesh.n_nodes <= WHOLE:
-        return HeatGeodesics(mesh, t)
+        return factored(mesh, t)
     mesh.require_surface()
     return DividedHeat(mesh, t)
 

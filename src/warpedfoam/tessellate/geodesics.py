@@ -366,7 +366,7 @@ _remembered: OrderedDict[tuple[bytes, float], HeatGeodesics] = OrderedDict()
 def factored(
     surface_or_mesh: Surface | TriangleMesh | trimesh.Trimesh, t: float | None = None
 ) -> HeatGeodesics:
-    """`HeatGeodesics`, taken from the last few made if one has equal nodes, triangles and t."""
+    """`HeatGeodesics`, taken from the last few made if one has equal nodes, triangles, periods and t."""
     mesh = as_mesh(surface_or_mesh)
     key = (_digest(mesh), _time(mesh, t))
     found = _remembered.pop(key, None)
@@ -393,6 +393,8 @@ def _time(mesh: TriangleMesh, t: float | None) -> float:
 def _digest(mesh: TriangleMesh) -> bytes:
     state = blake2b(mesh.nodes.tobytes(), digest_size=16)
     state.update(mesh.triangles.tobytes())
+    if mesh.period is not None:
+        state.update(mesh.period.tobytes())
     return state.digest()
 
 
