@@ -136,6 +136,9 @@ def _head(foam: Foam, formulas: Formulas, model: str) -> Iterable[str]:
             "integral_order_1D 8",
             "define vertex attribute side real[4]",
         )
+    # what dumps keep, and import_polygons looks for
+    facts = {"vertices": foam.network.n_vertices, "rest": rest, "exterior": int(foam.exterior is not None)}
+    yield from (f"parameter foam_{name} = {value}" for name, value in facts.items())
     if period is not None:
         # directions without a period get one that nothing crosses
         box = np.where(np.isfinite(period), period, 4.0 * foam.cell.surface.size + 4.0 * foam.cell.mean_gap)
