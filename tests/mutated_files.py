@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 #: Endings of the files that hold foams, and how often each scramble is tried with another seed.
-KINDS = (".npz", ".h5", ".vtp", ".ply", ".obj", ".dmp")
+KINDS = (".npz", ".h5", ".vtp", ".ply", ".obj", ".dmp", ".fe")
 SCRAMBLES = {
     "cut": 12,
     "bit": 30,
@@ -40,13 +40,14 @@ def all_cases() -> list[str]:
 def whole_files(folder: Path) -> dict[str, bytes]:
     """A sound file of each kind."""
     from tests.io_foams import sphere_foam, with_pressures
-    from warpedfoam import TrajectoryWriter, save, write_obj, write_ply, write_vtp
+    from warpedfoam import TrajectoryWriter, save, write_fe, write_obj, write_ply, write_vtp
 
     foam = with_pressures(sphere_foam(12, even=True))
     save(folder / "foam.npz", foam)
     write_vtp(folder / "foam.vtp", foam, curve_points=3)
     write_ply(folder / "foam.ply", foam, curve_points=3)
     write_obj(folder / "foam.obj", foam, curve_points=3)
+    write_fe(folder / "foam.fe", foam, segments=2)
     with TrajectoryWriter(folder / "foam.h5") as writer:
         for _ in range(3):
             writer.append(foam)

@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import warpedfoam as wf
+from warpedfoam.cli.app import app
+from warpedfoam.cli.partition import surface_options
 from warpedfoam.kernels.differences import differences
+from warpedfoam.studies.options import options_from
 from warpedfoam.surfaces.formula import DEEPEST, LONGEST
 
 RING = "(sqrt(x**2 + y**2) - 2)**2 + z**2 - 1"
@@ -141,6 +145,25 @@ def test_strangers_files_are_read_as_arithmetic_only(tmp_path: Path) -> None:
         with pytest.raises(wf.FileFormatError):
             wf.load(rewritten(wf.save(tmp_path / "foam.npz", foam), {"square": square}))
     assert not Path("harm").exists()
+
+
+def test_from_the_shell(tmp_path: Path) -> None:
+    words = ["foam", "revolution", "--formula", "4*(1 - z**2/9)", "--bottom", "-3", "--top", "3"]
+    done = CliRunner().invoke(app, [*words, "-n", "14", "--gap", "0.1", "-o", str(tmp_path), "--quiet"])
+    assert done.exit_code == 0, done.output
+    foam = wf.load(tmp_path / "foam.npz")
+    assert foam.cell.surface.square == wf.Formula("4*(1 - z**2/9)", "z")
+    for kind, sizes, words in (
+        ("implicit", {"bounds": "1 2 3"}, "bounds must be six numbers"),
+        ("implicit", {"formula": "import os"}, "cannot be read"),
+        ("graph", {"edge": "soft"}, "edge must be one of"),
+        ("graph", {"formula": "z"}, "found 'z'"),
+        ("revolution", {"bottom": 30.0}, "top must lie above bottom"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            _ = options_from({"surface": {"kind": kind, **sizes}}, "here").plates
+    given = surface_options("graph", ["formula=x*y/9", "width=6", "height=6", "edge=disk"])
+    assert given.build().disk
 
 
 def test_refusals() -> None:

@@ -138,9 +138,12 @@ def _add_command(
     plain = inspect.Parameter.KEYWORD_ONLY
     parameters = []
     for name, default in sizes.items():
-        if isinstance(default, str):
+        if isinstance(default, str) and not default:
             note: Any = typer.Argument(help=helps[name], metavar="MESH")
             parameters.append(inspect.Parameter(name, plain, annotation=Annotated[str, note]))
+        elif isinstance(default, str):
+            words = Annotated[str, typer.Option(help=helps[name])]
+            parameters.append(inspect.Parameter(name, plain, default=default, annotation=words))
         else:
             option = Annotated[float, typer.Option(help=helps[name])]
             parameters.append(inspect.Parameter(name, plain, default=default, annotation=option))
@@ -251,6 +254,33 @@ _add_surface(
     "schwarz_p",
     "A foam on one translational unit of Schwarz's P surface, repeating in space.",
     {"cell_length": "Period along x, y and z."},
+)
+_add_surface(
+    "implicit",
+    "A foam between the closed surface where a formula is 0, and its parallel surface.",
+    {
+        "formula": "Of x, y and z; it grows into the gap, such as 'x**2 + y**2/2 + z**4 - 100'.",
+        "bounds": "Two corners of a box round the surface, six numbers.",
+    },
+)
+_add_surface(
+    "graph",
+    "A foam between the landscape z = formula over a rectangle or a disk, and its parallel surface.",
+    {
+        "formula": "Of x and y.",
+        "width": "Side along x, or diameter.",
+        "height": "Side along y, or diameter.",
+        "edge": "rim: it ends there; joined: its sides are joined; disk: a round rim.",
+    },
+)
+_add_surface(
+    "revolution",
+    "A foam between the turned surface x**2 + y**2 = formula, and its parallel surface.",
+    {
+        "formula": "Of z: the square of the radius, 0 at a pole.",
+        "bottom": "Height of the lower end.",
+        "top": "Height of the upper end.",
+    },
 )
 _add_surface(
     "mesh",

@@ -14,6 +14,7 @@ from warpedfoam.cli.progress import Progress
 from warpedfoam.io import save, versions, write_columns_csv, write_record
 from warpedfoam.studies import MinimalPartition, minimal_partition
 from warpedfoam.studies.options import SurfaceOptions, options_from
+from warpedfoam.sizes import SIZES
 
 FOAM, TRIES, PICTURE, RECORD, STATE = "partition.npz", "tries.csv", "partition.png", "partition.json", "state"
 
@@ -98,6 +99,9 @@ def surface_options(name: str, sizes: Sequence[str]) -> SurfaceOptions:
         key, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not key:
             raise ValueError(f"--size {text}: write it as name=value, such as --size radius=1")
+        if isinstance(SIZES.get(table["kind"], {}).get(key), str):
+            table[key] = value
+            continue
         try:
             table[key] = float(value)
         except ValueError:

@@ -34,7 +34,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
     1 that runs along the plates.
 
     The exterior, or else the last bubble, has no quantity, because the others fix its volume; pressures are
-    relative to it. Motions of the surface into itself are pinned.
+    relative to it. Motions of the surface into itself are pinned. On surfaces without closed forms the
+    one-forms are polynomials that are fitted bubble by bubble, to 1e-6.
 
     The energy and the volumes of a string model converge to those of ``foam.energy`` and
     ``target_volumes`` like segments⁻², those of the soapfilm model to the bulging foam's like segments⁻⁴
@@ -50,7 +51,8 @@ def write_fe(path: PathLike, foam: Foam, *, model: str = "ruled", segments: int 
         Ends in ``.fe``.
     foam : Foam
         All its bubbles disks, but for an exterior. String models: on a `Sphere`, `Torus`, `Cylinder`,
-        `Catenoid`, `Ellipsoid` or `FlatTorus` (in the Evolver's torus model). Soapfilm model: on those whose
+        `Catenoid`, `Ellipsoid`, `FlatTorus` or `SchwarzP` (these two in the Evolver's torus model), or an
+        `Implicit`, `Graph` or `Revolution` that was made by ``from_formula``. Soapfilm model: on those whose
         outer plate has a formula too, a `Sphere`, `Torus`, `Cylinder` or `FlatTorus`.
     model : {"ruled", "string", "soapfilm"}, optional
         ``"ruled"`` (default): films as this package has them, γ ∫∫ |(I + tW)T| ds dt, with Gauss points in
@@ -136,6 +138,9 @@ def _head(foam: Foam, formulas: Formulas, model: str) -> Iterable[str]:
             "integral_order_1D 8",
             "define vertex attribute side real[4]",
         )
+    # what dumps keep, and import_polygons looks for
+    facts = {"vertices": foam.network.n_vertices, "rest": rest, "exterior": int(foam.exterior is not None)}
+    yield from (f"parameter foam_{name} = {value}" for name, value in facts.items())
     if period is not None:
         # directions without a period get one that nothing crosses
         box = np.where(np.isfinite(period), period, 4.0 * foam.cell.surface.size + 4.0 * foam.cell.mean_gap)

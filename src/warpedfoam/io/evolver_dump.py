@@ -126,8 +126,8 @@ def _dump(text: str) -> EvolverDump:
     starts = [sections[name].start() for name in ("vertices", "edges", "faces", "bodies", "read")]
     if starts != sorted(starts):
         raise FileFormatError("its sections are out of order")
-    numbers, points = _rows(text[sections["vertices"].end() : starts[1]], 3, "vertex")
-    _, ends = _rows(text[sections["edges"].end() : starts[2]], 2, "edge")
+    numbers, points, _ = element_rows(text[sections["vertices"].end() : starts[1]], 3, "vertex")
+    _, ends, _ = element_rows(text[sections["edges"].end() : starts[2]], 2, "edge")
     place = np.argsort(numbers)
     found = np.minimum(np.searchsorted(numbers[place], ends), len(numbers) - 1)
     edges = place[found]
@@ -142,9 +142,15 @@ def _dump(text: str) -> EvolverDump:
     return EvolverDump(_finite(energy.group(1)), frozen(points), frozen(edges), targets, pressures)
 
 
-def _rows(section: str, count: int, what: str) -> tuple[Ints, Floats]:
-    """Numbers of the elements, all different, and the ``count`` values after each."""
-    numbers, values = [], []
+def element_rows(section: str, count: int, what: str) -> tuple[Ints, Floats, list[str]]:
+    """Numbers of the elements, all different, the ``count`` values after each, and the words after these.
+
+    Raises
+    ------
+    FileFormatError
+        If a line is none of an element, or there is none.
+    """
+    numbers, values, words_after = [], [], []
     for line in section.replace("\\\n", " ").splitlines():
         words = line.split()
         if not words or words[0].startswith(("/", "*")) or not words[0].isdigit():
@@ -157,11 +163,12 @@ def _rows(section: str, count: int, what: str) -> tuple[Ints, Floats]:
             raise FileFormatError(f"{what} {words[0]} is not followed by {count} numbers")
         numbers.append(int(words[0]))
         values.append(row)
+        words_after.append(" ".join(words[count + 1 :]))
     if not numbers:
         raise FileFormatError(f"it has no {what}")
     if max(numbers) > 2**62 or len(set(numbers)) != len(numbers):
         raise FileFormatError(f"its {what} numbers are not all different")
-    return np.array(numbers, dtype=np.int64), np.array(values)
+    return np.array(numbers, dtype=np.int64), np.array(values), words_after
 
 
 def _finite(word: str) -> float:

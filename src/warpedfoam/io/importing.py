@@ -15,6 +15,7 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.errors import FileFormatError, TopologyError
 from warpedfoam.foam import MAX_ORDER, Foam, bubble_integrals
 from warpedfoam.io.atomic import PathLike, as_path
+from warpedfoam.io.evolver_polygons import evolver_polygons
 from warpedfoam.io.polygon_files import Polygons, obj_polygons, ply_polygons
 from warpedfoam.io.reading import brief, existing
 from warpedfoam.kernels.periodic import nearest_image
@@ -49,7 +50,8 @@ def import_polygons(
     Parameters
     ----------
     source : str, path, or (points, polygons)
-        A PLY or OBJ file, or an (n, 3) array and sequences of its rows, one per bubble.
+        A PLY or OBJ file, a string model of `write_fe` or a dump that the Surface Evolver made of it, or
+        an (n, 3) array and sequences of its rows, one per bubble.
     cell : HeleShawCell
         Its inner plate is the surface that the polygons cover.
     order : int, optional
@@ -105,22 +107,25 @@ def import_polygons(
     if isinstance(source, tuple):
         if len(source) != 2:
             raise TypeError(f"source must be a path or (points, polygons), got a tuple of {len(source)}")
-        return _foam(cell, source[0], source[1], 0, p, allowed, close, exterior)
+        return _foam(cell, source[0], source[1], 0, p, allowed, close, exterior, chords=False)
     path = existing(as_path(source, "source"))
     try:
-        return _foam(cell, *_read(path), p, allowed, close, exterior)
+        chords = path.suffix.lower() in (".fe", ".dmp")
+        return _foam(cell, *_read(path, cell), p, allowed, close, exterior, chords=chords)
     except (FileFormatError, TopologyError) as fault:
         raise type(fault)(f"cannot import {path}: {brief(fault)}") from None
 
 
-def _read(path: Path) -> Polygons:
+def _read(path: Path, cell: HeleShawCell) -> Polygons:
     kind, data = path.suffix.lower(), path.read_bytes()
     if kind == ".ply":
         points, polygons, vertices = ply_polygons(data)
     elif kind == ".obj":
         points, polygons, vertices = obj_polygons(data)
+    elif kind in (".fe", ".dmp"):
+        points, polygons, vertices = evolver_polygons(data, cell.surface.rim)
     else:
-        raise ValueError(f"source must be a .ply or .obj file, got {path.name!r}")
+        raise ValueError(f"source must be a .ply, .obj, .fe or .dmp file, got {path.name!r}")
     if not len(points) or not polygons:
         raise FileFormatError("it holds no polygons")
     if not np.isfinite(points).all():
@@ -142,6 +147,8 @@ def _foam(
     tolerance: float,
     weld: float,
     exterior: int | str | None,
+    *,
+    chords: bool,
 ) -> Foam:
     x = as_points(points, "points")
     holes = exterior == "holes"
@@ -188,6 +195,9 @@ def _foam(
     short, heads, films, inner, places = _merged(network, marked)
     tails_at, heads_at = on[heads[:, 0]], on[heads[:, 1]]
     offsets = _fitted(cell, tails_at, heads_at, films, on[inner], places, order)
+    if chords:
+        # those of the Evolver cut off 1/n² of the area under a parabola, so that its points lie farther out
+        offsets *= 1.0 - (np.bincount(films, minlength=len(heads))[:, None] + 1.0) ** -2.0
     ends = on[np.unique(heads)]
     volumes = _volumes(cell, short, ends, offsets, place)
     return Foam(cell, short, ends, offsets, volumes, exterior=place)

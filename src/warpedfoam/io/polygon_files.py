@@ -37,7 +37,7 @@ def obj_polygons(data: bytes) -> Polygons:
     """
     points: list[list[float]] = []
     polygons: list[list[int]] = []
-    lines = _text(data).replace("\\\n", " ").splitlines()
+    lines = text_in(data).replace("\\\n", " ").splitlines()
     for number, line in enumerate(lines, start=1):
         words = line.split("#", 1)[0].split()
         try:
@@ -50,7 +50,7 @@ def obj_polygons(data: bytes) -> Polygons:
                 polygons.append([p - 1 if p > 0 else len(points) + p if p else -1 for p in places])
         except ValueError as fault:
             raise FileFormatError(f"line {number} cannot be understood ({fault})") from None
-    return np.array(points, dtype=np.float64).reshape(-1, 3), polygons, _told(_text(data))
+    return np.array(points, dtype=np.float64).reshape(-1, 3), polygons, _told(text_in(data))
 
 
 def _told(text: str) -> int:
@@ -71,13 +71,13 @@ def ply_polygons(data: bytes) -> Polygons:
     if end is None or not data.startswith(b"ply"):
         raise FileFormatError("it is no PLY file, or its header does not end")
     head, body = data[: end.start()], data[end.end() :]
-    form, elements = _header(_text(head))
+    form, elements = _header(text_in(head))
     if form == "ascii":
-        words = _text(body).split()
+        words = text_in(body).split()
         if len(words) > 0 and elements:
-            return *_walk_words(words, elements), _told(_text(head))
+            return *_walk_words(words, elements), _told(text_in(head))
         raise FileFormatError("it has no body")
-    return *_walk_bytes(body, elements, "<" if form == "binary_little_endian" else ">"), _told(_text(head))
+    return *_walk_bytes(body, elements, "<" if form == "binary_little_endian" else ">"), _told(text_in(head))
 
 
 Property = tuple[str, str, str | None]
@@ -188,7 +188,7 @@ def _axes(properties: list[Property]) -> list[int]:
     return [names.index(axis) for axis in "xyz"]
 
 
-def _text(data: bytes) -> str:
+def text_in(data: bytes) -> str:
     """Text in whatever extension of ASCII: numbers and keywords are ASCII, comments are passed over."""
     if b"\0\0" in data or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise FileFormatError("it is no text where text is expected")

@@ -14,13 +14,16 @@ from warpedfoam.cell import HeleShawCell
 from warpedfoam.foam import MAX_ORDER
 from warpedfoam.io.colours import COLOR_CHOICES
 from warpedfoam.relax.linear import SOLVERS
-from warpedfoam.sizes import SIZES
+from warpedfoam.sizes import SIGNED, SIZES
 from warpedfoam.surfaces import (
     Catenoid,
     Cylinder,
     Ellipsoid,
     FlatTorus,
+    Graph,
+    Implicit,
     MeshSurface,
+    Revolution,
     SchwarzP,
     Sphere,
     Surface,
@@ -30,6 +33,27 @@ from warpedfoam.tessellate.build import CELL_KINDS, MOST_BUBBLES, MOST_NODES, SE
 
 Section = TypeVar("Section")
 DEFAULT_BUBBLES = 200
+
+#: What the edge of a graph may be.
+EDGES = ("rim", "joined", "disk")
+
+
+def _implicit(formula: str, bounds: str) -> Implicit:
+    try:
+        corners = [float(number) for number in bounds.replace(",", " ").split()]
+    except ValueError:
+        corners = []
+    if len(corners) != 6:
+        raise ValueError(
+            f"bounds must be six numbers, two corners of a box such as '-2, -2, -2, 2, 2, 2', got {bounds!r}"
+        )
+    return Implicit.from_formula(formula, [corners[:3], corners[3:]])
+
+
+def _graph(formula: str, width: float, height: float, edge: str) -> Graph:
+    as_choice(edge, "edge", EDGES)
+    return Graph.from_formula(formula, width, height, periodic=edge == "joined", disk=edge == "disk")
+
 
 #: What makes each kind of surface from its sizes.
 MAKERS: Mapping[str, Callable[..., Surface]] = {
@@ -41,6 +65,9 @@ MAKERS: Mapping[str, Callable[..., Surface]] = {
     "catenoid": Catenoid,
     "flat_torus": FlatTorus,
     "schwarz_p": SchwarzP,
+    "implicit": _implicit,
+    "graph": _graph,
+    "revolution": Revolution.from_formula,
     "mesh": lambda file: MeshSurface.from_file(file),
 }
 
@@ -349,7 +376,9 @@ def _surface(table: Mapping[str, Any], places: Places) -> SurfaceOptions:
     for name, value in table.items():
         if name != "kind":
             places.require_known(f"surface.{name}", option_names(kind))
-            reader = _text if isinstance(SIZES[kind][name], str) else _above_zero
+            reader = (
+                _text if isinstance(SIZES[kind][name], str) else as_number if name in SIGNED else _above_zero
+            )
             sizes[name] = places.read(f"surface.{name}", value, reader)
     if kind == "mesh" and "file" not in sizes:
         raise ValueError(f"{places.of('surface')}: surface.file is needed: the name of a mesh file")
