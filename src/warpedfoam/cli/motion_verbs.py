@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, signals
+from warpedfoam.cli.ending import NOT_CONVERGED, ending_well, say, signals
 from warpedfoam.cli.examples import epilog
 from warpedfoam.cli.flags import Color, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet
 from warpedfoam.cli.progress import progress_bars
@@ -83,4 +83,5 @@ def drift(
         elif not quiet:
             print(job.summary_text(facts), flush=True)
     if not facts["completed"]:
+        say(f"did not get to the end: {facts['message']}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)
