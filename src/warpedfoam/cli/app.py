@@ -11,7 +11,19 @@ import typer
 
 from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import EXAMPLES, epilog
-from warpedfoam.cli.flags import OUTPUT, Color, Debug, Folder, Json, Picture, Quiet, Seed
+from warpedfoam.cli.flags import (
+    CELLS,
+    METHOD,
+    OUTPUT,
+    SEEDS,
+    Color,
+    Debug,
+    Folder,
+    Json,
+    Picture,
+    Quiet,
+    Seed,
+)
 from warpedfoam.cli.foam_verbs import foam_verbs
 from warpedfoam.cli.groups import OneLine, SurfaceOrFile
 from warpedfoam.cli.motion_verbs import motion_verbs
@@ -43,9 +55,17 @@ app.add_typer(motion_verbs)
 
 Count = Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of bubbles.")]
 Gap = Annotated[float, typer.Option("--gap", help="Distance between the plates.")]
-Seeds = Annotated[str, typer.Option("--seeds", help="Where bubbles start: random, blue or lattice.")]
+Seeds = Annotated[
+    str,
+    typer.Option("--seeds", help="Where bubbles start: random, blue or lattice.", autocompletion=SEEDS),
+]
 Cells = Annotated[
-    str, typer.Option("--cells", help="Start from voronoi cells, or power cells of the right volumes.")
+    str,
+    typer.Option(
+        "--cells",
+        help="Start from voronoi cells, or power cells of the right volumes.",
+        autocompletion=CELLS,
+    ),
 ]
 Lloyd = Annotated[int, typer.Option("--lloyd", help="Sweeps that even out the bubbles before relaxing.")]
 Volumes = Annotated[
@@ -84,6 +104,10 @@ def run(
         typer.Option("--set", metavar="KEY=VALUE", help="Replace an option, such as foam.n_bubbles=500."),
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Random seed.")] = None,
+    picture: Annotated[
+        bool | None,
+        typer.Option("--picture/--no-picture", help="Draw pictures too; as the file says if left out."),
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -98,6 +122,8 @@ def run(
             overrides.append(f"output.folder={json.dumps(out)}")
         if seed is not None:
             overrides.append(f"seed={seed}")
+        if picture is not None:
+            overrides.append(f"output.picture={json.dumps(picture)}")
         return read_options(file, overrides)
 
     _run(options, as_json=as_json, quiet=quiet, debug=debug)
@@ -194,6 +220,7 @@ SHARED: Mapping[str, tuple[Any, Any]] = {
     "order": (Order, 4),
     "t1": (T1, True),
     "color_by": (Color, "charge"),
+    "picture": (Picture, True),
     "out": (Folder, "out"),
     "as_json": (Json, False),
     "quiet": (Quiet, False),
@@ -204,7 +231,12 @@ POTENTIAL: Mapping[str, tuple[Any, Any]] = {
     "volume": (Annotated[float, typer.Option("--volume", help="Volume of the bubble.")], 0.5),
     "gap": (Gap, 0.5),
     "method": (
-        Annotated[str, typer.Option("--method", help="theory, ruled or free (3D films); several by commas.")],
+        Annotated[
+            str,
+            typer.Option(
+                "--method", help="theory, ruled or free (3D films); several by commas.", autocompletion=METHOD
+            ),
+        ],
         "theory",
     ),
     "points": (Annotated[int, typer.Option("--points", help="About so many places all over it.")], 300),
@@ -298,7 +330,7 @@ def _values(surface: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]
         "cell": {"gap": given["gap"]},
         "foam": foam if given["volumes"] is None else {**foam, "volumes": given["volumes"]},
         "relax": {"order": given["order"], "t1": given["t1"]},
-        "output": {"folder": given["out"], "color_by": given["color_by"]},
+        "output": {"folder": given["out"], "color_by": given["color_by"], "picture": given["picture"]},
     }
 
 

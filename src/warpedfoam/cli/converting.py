@@ -33,6 +33,7 @@ WRITERS: dict[str, tuple[Callable[..., Any], str]] = {
     ".fe": (io.write_fe, "Surface Evolver"),
 }
 _COLOURED = (".ply", ".glb")
+TRAJECTORIES = (".h5", ".hdf5")
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def read_foam(file: str, frame: int = -1) -> Read:
         return Read(io.load(file), "npz", None, None, None)
     if ending == ".vtp":
         return Read(io.read_vtp(file), "vtp", None, None, None)
-    if ending in (".h5", ".hdf5"):
+    if ending in TRAJECTORIES:
         with io.Trajectory(file) as frames:
             if not -len(frames) <= frame < len(frames):
                 raise ValueError(f"--frame {frame}: {file} holds {len(frames)} frames, numbered from 0")

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpedfoam.analysis import DefectReport, bond_order, defects, foam_statistics
+from warpedfoam.cli.converting import read_foam
 from warpedfoam.cli.folders import output_folder
 from warpedfoam.foam import Foam
-from warpedfoam.io import load, write_columns_csv, write_record
+from warpedfoam.io import write_columns_csv, write_record
 from warpedfoam.io.atomic import writable_path
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ PICTURE, RECORD = "defects.png", "defects.json"
 
 
 def inspect_file(
-    file: str, *, out: str | None, tiny: float, picture: bool
+    file: str, *, frame: int, out: str | None, tiny: float, picture: bool
 ) -> tuple[DefectReport, dict[str, Any]]:
     """Find the defects of the foam in ``file``, write tables, picture and record, and return the facts.
 
@@ -30,7 +31,9 @@ def inspect_file(
     Parameters
     ----------
     file : str
-        A foam that `warpedfoam.save` wrote.
+        A foam that can be read.
+    frame : int
+        Of a trajectory.
     out : str, optional
         Folder for the results; that of ``file`` by default.
     tiny : float
@@ -43,7 +46,7 @@ def inspect_file(
     ValueError, OSError
         If the file is no foam, a number is out of range, or the folder cannot be written.
     """
-    foam = load(file)
+    foam = read_foam(file, frame).foam
     found = defects(foam, tiny=tiny)
     folder = Path(file).parent if out is None else output_folder(out)
     names = [f"{table}.csv" for table in TABLES] + ([PICTURE] if picture else [])

@@ -29,8 +29,9 @@ class Stopped(BaseException):
 
 
 def say(text: str) -> None:
-    """A line of our own on stderr."""
-    print(f"warpedfoam: {' '.join(text.split())}", file=sys.stderr)
+    """A line of our own on stderr; what quotes a long word of the call is cut."""
+    line = " ".join(text.split())
+    print(f"warpedfoam: {line if len(line) <= 1000 else line[:996] + ' ...'}", file=sys.stderr)
 
 
 def answer(facts: Mapping[str, Any], text: Callable[[], str], *, as_json: bool, quiet: bool) -> None:
@@ -61,11 +62,18 @@ def ending_well(debug: bool) -> Iterator[None]:
         # the files are written; that nobody reads the summary is no fault
         raise typer.Exit(CLOSED_PIPE) from None
     except Exception as fault:
-        bad = isinstance(fault, (ValueError, TypeError, OSError, ImportError))
+        bad = isinstance(fault, (ValueError, TypeError, OSError, ImportError, MemoryError, OverflowError))
         if debug or not (bad or isinstance(fault, ConvergenceError)):
             traceback.print_exc()
         if isinstance(fault, OSError) and fault.strerror and fault.filename:
             say(f"{fault.filename}: {fault.strerror}")
+        elif isinstance(fault, (MemoryError, OverflowError)):
+            what = (
+                "needs more memory than there is"
+                if isinstance(fault, MemoryError)
+                else "is beyond all numbers"
+            )
+            say(f"what is asked for {what}; choose smaller sizes or fewer bubbles ({fault})")
         else:
             say(str(fault) or type(fault).__name__)
         code = BAD_INPUT if bad else NOT_CONVERGED if isinstance(fault, ConvergenceError) else FAULT

@@ -8,7 +8,19 @@ import typer
 
 from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import epilog
-from warpedfoam.cli.flags import OUTPUT, Color, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet
+from warpedfoam.cli.flags import (
+    COLORS,
+    OUTPUT,
+    SOLVER,
+    Color,
+    Debug,
+    FoamFile,
+    Folder,
+    Frame,
+    Json,
+    Picture,
+    Quiet,
+)
 from warpedfoam.cli.progress import progress_bars
 
 foam_verbs = typer.Typer()
@@ -29,7 +41,9 @@ def relax(
         float, typer.Option("--tolerance", help="Largest force left, in tension times gap.")
     ] = 1e-10,
     max_iterations: Annotated[int, typer.Option("--max-iterations", help="Most steps.")] = 1000,
-    solver: Annotated[str, typer.Option("--solver", help="auto, superlu or pardiso.")] = "auto",
+    solver: Annotated[
+        str, typer.Option("--solver", help="auto, superlu or pardiso.", autocompletion=SOLVER)
+    ] = "auto",
     frame: Frame = -1,
     color_by: Color = "charge",
     picture: Picture = True,
@@ -75,6 +89,12 @@ def _kinds() -> list[str]:
     return list(KINDS)
 
 
+def _quantities() -> list[str]:
+    from warpedfoam.plot.histograms import QUANTITIES
+
+    return list(QUANTITIES)
+
+
 @foam_verbs.command(epilog=epilog("plot"))
 def plot(
     file: FoamFile,
@@ -89,7 +109,9 @@ def plot(
     color_by: Annotated[
         str | None,
         typer.Option(
-            "--color-by", help="Colour foam or map by charge, pressure, sides, area, volume or curvature."
+            "--color-by",
+            help="Colour foam or map by charge, pressure, sides, area, volume or curvature.",
+            autocompletion=COLORS,
         ),
     ] = None,
     projection: Annotated[
@@ -108,6 +130,7 @@ def plot(
             "--of",
             help="Histogram of sides, charge, area, volume, pressure, curvature, film_length, film_area "
             "or angle.",
+            autocompletion=_quantities,
         ),
     ] = None,
     view: Annotated[

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, signals
+from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import epilog
 from warpedfoam.cli.flags import Color, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet
 from warpedfoam.cli.progress import progress_bars
@@ -79,6 +79,7 @@ def drift(
             )
         answer(facts, lambda: job.summary_text(facts), as_json=as_json, quiet=quiet)
     if not facts["completed"]:
+        say(f"did not get to the end: {facts['message']}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -143,4 +144,5 @@ def coarsen(
             )
         answer(facts, lambda: job.summary_text(facts), as_json=as_json, quiet=quiet)
     if not facts["completed"]:
+        say(f"did not get to the end: {facts['message']}; the results are marked as such")
         raise typer.Exit(NOT_CONVERGED)

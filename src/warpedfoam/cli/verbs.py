@@ -9,7 +9,22 @@ import typer
 
 from warpedfoam.cli.ending import NOT_CONVERGED, answer, ending_well, say, signals
 from warpedfoam.cli.examples import epilog
-from warpedfoam.cli.flags import OUTPUT, Debug, FoamFile, Folder, Frame, Json, Picture, Quiet, Seed
+from warpedfoam.cli.flags import (
+    COLORS,
+    FIGURE,
+    LAYOUT,
+    OUTPUT,
+    SHOWN,
+    SURFACE,
+    Debug,
+    FoamFile,
+    Folder,
+    Frame,
+    Json,
+    Picture,
+    Quiet,
+    Seed,
+)
 from warpedfoam.cli.progress import progress_bars
 
 verbs = typer.Typer()
@@ -22,7 +37,8 @@ def figures(
     ],
     out: Annotated[str, typer.Option(*OUTPUT, help="Folder for the figures.")] = "figs",
     only: Annotated[
-        list[str] | None, typer.Option("--only", help="One figure, such as torus; may be repeated.")
+        list[str] | None,
+        typer.Option("--only", help="One figure, such as torus; may be repeated.", autocompletion=FIGURE),
     ] = None,
     torus_table: Annotated[
         str | None,
@@ -87,10 +103,11 @@ def check(
 
 @verbs.command(epilog=epilog("defects"))
 def defects(
-    file: Annotated[str, typer.Argument(help="A saved foam: foam.npz.", metavar="FOAM.NPZ")],
+    file: FoamFile,
     out: Annotated[
         str | None, typer.Option(*OUTPUT, help="Folder for the results; the foam's own if left out.")
     ] = None,
+    frame: Frame = -1,
     tiny: Annotated[
         float, typer.Option("--tiny", help="Flag films shorter than this many bubble sizes.")
     ] = 0.1,
@@ -103,7 +120,7 @@ def defects(
     with ending_well(debug), signals():
         from warpedfoam.cli.defects import inspect_file, summary_tables, summary_text
 
-        found, facts = inspect_file(file, out=out, tiny=tiny, picture=picture)
+        found, facts = inspect_file(file, frame=frame, out=out, tiny=tiny, picture=picture)
         if as_json:
             print(json.dumps(facts, allow_nan=False), flush=True)
         elif not quiet:
@@ -129,7 +146,9 @@ def convert(
     color_by: Annotated[
         str | None,
         typer.Option(
-            "--color-by", help="Colour PLY and GLB by charge, pressure, sides, area, volume or curvature."
+            "--color-by",
+            help="Colour PLY and GLB by charge, pressure, sides, area, volume or curvature.",
+            autocompletion=COLORS,
         ),
     ] = None,
     frame: Frame = -1,
@@ -167,7 +186,10 @@ def info(
 def view(
     files: Annotated[
         list[str],
-        typer.Argument(help="Saved foams (foam.npz); several make a trajectory.", metavar="FOAM.NPZ..."),
+        typer.Argument(
+            help="Foams: NPZ, VTP or HDF5 of warpedfoam; several, or frames, make a trajectory.",
+            metavar="FOAM...",
+        ),
     ],
     out: Annotated[
         str | None, typer.Option(*OUTPUT, help="HTML file; beside the first foam if left out.")
@@ -175,11 +197,16 @@ def view(
     color_by: Annotated[
         str,
         typer.Option(
+            "--color-by",
             help="Show first: charge, sides, area, volume, pressure, curvature (of bubbles), surface "
-            "(curvature, point by point) or id."
+            "(curvature, point by point) or id.",
+            autocompletion=SHOWN,
         ),
     ] = "charge",
     title: Annotated[str | None, typer.Option("--title", help="Heading of the page.")] = None,
+    frame: Annotated[
+        int | None, typer.Option("--frame", help="Only this frame of a trajectory, from 0; -1 is the last.")
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -188,7 +215,7 @@ def view(
     with ending_well(debug), signals():
         from warpedfoam.cli.viewing import view_files
 
-        path, facts = view_files(files, out=out, color_by=color_by, title=title)
+        path, facts = view_files(files, out=out, color_by=color_by, title=title, frame=frame)
         written = f"written   {path} ({facts['bytes'] / 1e6:.2g} MB): open it in a browser"
         answer(facts, lambda: written, as_json=as_json, quiet=quiet)
 
@@ -228,7 +255,10 @@ def ensemble(
 @verbs.command(epilog=epilog("partition"))
 def partition(
     surface: Annotated[
-        str, typer.Argument(help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE")
+        str,
+        typer.Argument(
+            help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE", autocompletion=SURFACE
+        ),
     ],
     n_bubbles: Annotated[int, typer.Option("-n", "--n-bubbles", help="Number of equal areas.")],
     size: Annotated[
@@ -265,7 +295,10 @@ def partition(
 @verbs.command(epilog=epilog("cluster"))
 def cluster(
     surface: Annotated[
-        str, typer.Argument(help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE")
+        str,
+        typer.Argument(
+            help="sphere, torus, ellipsoid, ..., or a mesh file.", metavar="SURFACE", autocompletion=SURFACE
+        ),
     ],
     n_bubbles: Annotated[
         str, typer.Option("-n", "--n-bubbles", help="Bubbles of the cluster, or of several: 7,3.")
@@ -273,7 +306,7 @@ def cluster(
     size: Annotated[
         list[str] | None, typer.Option("--size", metavar="NAME=VALUE", help="A size, such as radius=1.")
     ] = None,
-    gap: Annotated[float, typer.Option("--gap", help="Distance of the plates.")] = 0.5,
+    gap: Annotated[float, typer.Option("--gap", help="Distance between the plates.")] = 0.5,
     volume: Annotated[float, typer.Option("--volume", help="Volume of each bubble.")] = 0.5,
     centre: Annotated[
         list[str] | None, typer.Option("--centre", metavar="X,Y,Z", help="Where; once for each cluster.")
@@ -281,7 +314,9 @@ def cluster(
     orientation: Annotated[
         float, typer.Option("--orientation", help="Angle of the long axis in degrees; up a tube is 0.")
     ] = 0.0,
-    layout: Annotated[str, typer.Option("--layout", help="hexagonal or random.")] = "hexagonal",
+    layout: Annotated[
+        str, typer.Option("--layout", help="hexagonal or random.", autocompletion=LAYOUT)
+    ] = "hexagonal",
     seed: Seed = 0,
     order: Annotated[int, typer.Option("--order", help="Polynomial order of the films, 2 to 24.")] = 8,
     contacts: Annotated[
