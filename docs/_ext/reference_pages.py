@@ -30,7 +30,8 @@ TOPICS = (
     ("search", "Low energies", "Annealing, least partitions, repelling points.",
      ("studies.annealing", "studies.partition", "studies.thomson")),
     ("ensembles", "Ensembles", "Thousands of foams, one table.", ("studies.ensemble", "studies.study")),
-    ("studies", "More studies", "Motion and everything else that is made of the parts above.", ("studies",)),
+    ("motion", "Motion", "Against friction on the plates: the viscous froth.", ("motion",)),
+    ("studies", "More studies", "Everything else that is made of the parts above.", ("studies",)),
     ("files", "Files", "Written whole or not at all.", ("io",)),
     ("pictures", "Pictures and the viewer", "Matplotlib figures, and one HTML file with the foam in 3D.",
      ("plot", "view")),
@@ -78,19 +79,60 @@ def grouped() -> dict[str, list[tuple[str, Any]]]:
     return {page: sorted(items, key=lambda pair: pair[0].lower()) for page, items in found.items() if items}
 
 
-def entry(name: str, item: Any) -> list[str]:
-    """The directive for one thing."""
+def entry(name: str, item: Any, seen: str) -> list[str]:
+    """The directive for one thing, and where to see it at work."""
     if inspect.isclass(item):
-        return [f".. autoclass:: {name}", "   :members:", ""]
+        return [f".. autoclass:: {name}", "   :members:", "", seen, ""]
     if callable(item):
-        return [f".. autofunction:: {name}", ""]
+        return [f".. autofunction:: {name}", "", seen, ""]
     return [f".. autodata:: {name}", ""]
 
 
-def pages() -> dict[str, str]:
+def uses(docs: Path) -> dict[str, list[str]]:
+    """Public names, and pages and examples whose Python, which the tests run, has them as ``wf.name``."""
+    texts = {}
+    for page in [*docs.glob("*.md"), *docs.glob("begin/*.md"), *docs.glob("howto/*.md")]:
+        text = page.read_text(encoding="utf-8")
+        code = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        texts[f"/{page.relative_to(docs).with_suffix('').as_posix()}"] = "\n".join(code)
+    for example in [*(docs.parent / "examples").glob("*.py"), *(docs.parent / "examples").glob("*.ipynb")]:
+        texts[f"/gallery/{example.stem}"] = example.read_text(encoding="utf-8")
+    found: dict[str, list[str]] = {}
+    # how-tos first, then the guides and the gallery, the front page last
+    for page in sorted(texts, key=lambda page: (page == "/index", "/howto/" not in page, page)):
+        for name in sorted(set(re.findall(r"\bwf\.(\w+)", texts[page]))):
+            found.setdefault(name, []).append(page)
+    return found
+
+
+def makers(public: dict[str, Any]) -> dict[str, list[str]]:
+    """Types and the public functions that return them."""
+    found: dict[str, list[str]] = {}
+    for name, item in public.items():
+        given = inspect.signature(item).return_annotation if inspect.isfunction(item) else None
+        for kind in re.findall(r"\w+", given if isinstance(given, str) else ""):
+            found.setdefault(kind, []).append(name)
+    return found
+
+
+def seen_at(name: str, item: Any, used: dict[str, list[str]], made: dict[str, list[str]]) -> str:
+    """A line that leads to an example; empty if there is none."""
+    said = []
+    if inspect.isclass(item) and made.get(name):
+        said.append("Made by " + ", ".join(f":py:obj:`{maker}`" for maker in made[name][:4]) + ".")
+    if used.get(name):
+        said.append("Used in " + ", ".join(f":doc:`{page}`" for page in used[name][:4]) + ".")
+    return " ".join(said)
+
+
+def pages(docs: Path) -> dict[str, str]:
     """File names and texts."""
+    import warpedfoam
+
     titles = {page: (title, intro) for page, title, intro, _ in TOPICS}
     groups = grouped()
+    used = uses(docs)
+    made = makers({name: getattr(warpedfoam, name) for name in warpedfoam.__all__})
     out = {}
     for page, items in groups.items():
         title, intro = titles[page]
@@ -98,7 +140,7 @@ def pages() -> dict[str, str]:
         lines = [title, "=" * len(title), "", intro, "", ".. autosummary::", "   :nosignatures:", ""]
         lines += [f"   {name}" for name, _ in items] + [""]
         for name, item in items:
-            lines += entry(name, item)
+            lines += entry(name, item, seen_at(name.rpartition(".")[2], item, used, made))
         out[f"{page}.rst"] = "\n".join(lines)
     index = [
         "Reference",
@@ -107,7 +149,10 @@ def pages() -> dict[str, str]:
         "Every public name, by topic. ``import warpedfoam as wf`` has them",
     ]
     index += ["all but for those whose full name says where else they live.", "", ".. toctree::"]
-    index += ["   :maxdepth: 1", "", *(f"   {page}" for page in groups)]
+    index += ["   :maxdepth: 1", "   :hidden:", "", *(f"   {page}" for page in groups), ""]
+    for page, items in groups.items():
+        names = ", ".join(f":py:obj:`~{name}`" for name, _ in items)
+        index += [f":doc:`{page}`", f"   {names}", ""]
     out["index.rst"] = "\n".join([*index, ""])
     return out
 
@@ -122,7 +167,7 @@ def write_if_changed(path: Path, text: str) -> None:
 def write_pages(app: Sphinx) -> None:
     """Write the reference where Sphinx will look for it."""
     folder = Path(app.srcdir) / "reference"
-    texts = pages()
+    texts = pages(Path(app.srcdir))
     for path in folder.glob("*.rst"):
         if path.name not in texts:
             path.unlink()

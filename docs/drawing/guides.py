@@ -38,6 +38,15 @@ def schwarz_p(path: Path) -> None:
     wf.save_picture(path, relaxed(wf.voronoi_foam(cell, 200, seed=0)), view=(25.0, -60.0), dpi=110)
 
 
+def clusters(path: Path) -> None:
+    """Two open clusters on a thick torus, as `relax` leaves them."""
+    torus = wf.Torus(8.0, 4.0)
+    start = torus.points(np.array([1.2, 1.0]), np.array([-0.6, -1.9]))
+    cell = wf.HeleShawCell(torus, gap=0.5)
+    foam = wf.cluster_foam(cell, [19, 7], volumes=0.5, centre=start)
+    wf.save_picture(path, relaxed(foam), view=(18.0, -75.0), dpi=110)
+
+
 def defects_sphere(path: Path) -> None:
     """Clusters, outlined, and Burgers vectors."""
     cell = wf.HeleShawCell(wf.Sphere(10.0), gap=0.1)
@@ -113,6 +122,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "foam_double_torus": lambda path: on_mesh("double_torus", path),
     "foam_junction": lambda path: on_mesh("junction", path),
     "foam_schwarz_p": schwarz_p,
+    "clusters": clusters,
     "defects_sphere": defects_sphere,
     "geodesic_circles": circles,
     "second_order": of_the_paper("second_order"),

@@ -281,6 +281,14 @@ def remove_markers(foam: Foam, markers: ArrayLike) -> Foam:
     ------
     TypeError, ValueError, TopologyError
         If a vertex is no marker, two share a film, or the film would begin and end at one vertex.
+
+    Examples
+    --------
+    >>> from warpedfoam import HeleShawCell, Sphere, cluster_foam
+    >>> pair = cluster_foam(HeleShawCell(Sphere(10.0), gap=0.5), 2, volumes=0.5)
+    >>> marked = add_markers(pair, [0])  # the last vertex is the new one
+    >>> marked.network.n_vertices, remove_markers(marked, [marked.network.n_vertices - 1]).network.n_vertices
+    (9, 8)
     """
     if not isinstance(foam, Foam):
         raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")

@@ -187,6 +187,15 @@ def wall_t1(foam: Foam, index: int, kind: str = "film", *, length: float | None 
     ------
     ValueError, TopologyError
         If there is no such film or wall, or it may not go.
+
+    Examples
+    --------
+    >>> from warpedfoam import Catenoid, HeleShawCell, voronoi_foam
+    >>> foam = voronoi_foam(HeleShawCell(Catenoid(1.0, 1.5), gap=0.05), 30, seeds="blue")
+    >>> ends = np.isin(foam.network.origin.reshape(-1, 2), foam.network.rim_vertices).any(axis=1)
+    >>> part = wall_t1(foam, int(np.flatnonzero(ends)[0]))
+    >>> foam.network.n_films - part.network.n_films, int(part.network.charges.sum())
+    (1, 0)
     """
     if not isinstance(foam, Foam):
         raise TypeError(f"foam must be a Foam, got {type(foam).__name__}")

@@ -278,7 +278,7 @@ def _plates(text: str, _: str) -> HeleShawCell:
 
 
 def read_study(path: str | Path, overrides: Iterable[str] = ()) -> Study:
-    """Read a study from a TOML file, some of its options replaced by ``section.name=value`` texts.
+    r"""Read a study from a TOML file, some of its options replaced by ``section.name=value`` texts.
 
     Parameters
     ----------
@@ -293,6 +293,15 @@ def read_study(path: str | Path, overrides: Iterable[str] = ()) -> Study:
         Not TOML, or anything that `Study` refuses.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "study.toml"
+    ...     _ = file.write_text('seed = 1\nrepeats = 5\nobservables = ["mu2"]\n[foam]\nn_bubbles = 100')
+    ...     read_study(file, ["repeats=10"]).repeats
+    10
     """
     values, origins = read_values(path, overrides)
     places = Places(str(path), origins)
