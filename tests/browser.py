@@ -217,9 +217,17 @@ class Browser:
         self._send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
         self.settle()
 
-    def key(self, name: str, *, text: str | None = None, modifiers: int = 0) -> None:
-        """Press a key and let go."""
-        common: dict[str, Any] = {"key": name, "modifiers": modifiers}
+    def accessibility(self) -> list[tuple[str, str]]:
+        """Role and name of everything that a screen reader is told of."""
+        nodes = self._send("Accessibility.getFullAXTree")["nodes"]
+        heard = [node for node in nodes if not node["ignored"]]
+        return [
+            (node.get("role", {}).get("value", ""), node.get("name", {}).get("value", "")) for node in heard
+        ]
+
+    def key(self, name: str, *, text: str | None = None, modifiers: int = 0, code: int = 0) -> None:
+        """Press a key and let go; ``code`` is that of keys which the browser itself heeds, as Tab (9)."""
+        common: dict[str, Any] = {"key": name, "modifiers": modifiers, "windowsVirtualKeyCode": code}
         down = {"type": "rawKeyDown"} if text is None else {"type": "keyDown", "text": text}
         self._send("Input.dispatchKeyEvent", **down, **common)
         self._send("Input.dispatchKeyEvent", type="keyUp", **common)

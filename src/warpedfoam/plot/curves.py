@@ -42,7 +42,7 @@ def plot_sides(statistics: FoamStatistics, *, width: float | None = None) -> Fig
     if s.aboav is not None:
         law = (s.mean_sides - s.aboav) * s.sides + s.mean_sides * s.aboav + s.mu2
         middle.plot(s.sides, law, "-", color=ORANGE, label=f"Aboav–Weaire, a = {s.aboav:.2f}")
-    middle.legend(frameon=False, fontsize=style.small)
+    middle.legend(frameon=False, fontsize=style.small, handlelength=1.4)
     style.dress(middle, "sides n", "n · m(n)", "mean sides m(n) of neighbours")
     right.plot(s.sides, s.area_by_sides, "o", color=BLUE, label="measured")
     if np.ptp(s.area_by_sides) < EQUAL:
@@ -52,9 +52,12 @@ def plot_sides(statistics: FoamStatistics, *, width: float | None = None) -> Fig
     elif s.lewis is not None:
         law = 1.0 + s.lewis * (s.sides - s.mean_sides)
         right.plot(s.sides, law, "-", color=ORANGE, label=f"Lewis, slope {s.lewis:.3g}")
-    right.legend(frameon=False, fontsize=style.small)
+    right.legend(frameon=False, fontsize=style.small, handlelength=1.4)
     style.dress(right, "sides n", "mean area / that of all", "areas")
     right.ticklabel_format(axis="y", useOffset=False)
+    if style.small_panels(3):
+        middle.margins(y=0.4)  # room for the legends
+        right.margins(y=0.4)
     for axes in (left, middle, right):
         axes.set_xticks(s.sides)
     return figure
@@ -92,7 +95,7 @@ def plot_correlations(found: Correlations, *, width: float | None = None) -> Fig
     if c.screening_length is not None:
         at = c.screening_length / c.spacing
         right.axvline(at, color=GREY, linestyle="--", label=f"S = 1/e at {at:.2f} a")
-        right.legend(frameon=False, fontsize=style.small)
+        right.legend(frameon=False, fontsize=style.small, handlelength=1.4)
     style.dress(right, "distance s / a", "charge within s, S(s)", "screening" + note)
     return figure
 
@@ -130,13 +133,13 @@ def plot_charge_profile(
         middles, p.charge, p.charge_error, wings, "o", color=BLUE, markersize=5, capsize=3, label="charge Q"
     )
     left.plot(middles, p.curvature, "x", color=GREEN, label="(3/π) ∫ G dA of its bubbles")
-    left.legend(frameon=False, fontsize=style.small)
+    left.legend(frameon=False, fontsize=style.small, handlelength=1.4)
     title = "1 foam, no error bars" if count == 1 else f"mean of {count} foams and its standard error"
     style.dress(left, coordinate, "charge in the band", title)
     low, high = float(p.region_curvature.min()), float(p.region_curvature.max())
     right.plot([low, high], [low, high], "-", color=ORANGE, label="Q = (3/π) ∫ G dA")
     right.errorbar(p.region_curvature, p.charge, p.charge_error, fmt="o", color=BLUE, markersize=5, capsize=3)
-    right.legend(frameon=False, fontsize=style.small)
+    right.legend(frameon=False, fontsize=style.small, handlelength=1.4)
     style.dress(right, "(3/π) ∫ G dA of the band", "charge Q", "charge against curvature")
     return figure
 

@@ -118,6 +118,8 @@ def plot_histogram(
     else:
         edges = _edges(known, count)
         axes.hist(known, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
+        if shift or style.narrow:
+            axes.locator_params(axis="x", nbins=4 if style.narrow else 6)
     mean, deviation = float(known.mean()), float(known.std())
     # pressures have no mean but round-off
     mean = 0.0 if abs(mean) < 1e-12 * float(np.abs(known).max()) else mean

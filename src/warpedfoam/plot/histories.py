@@ -67,7 +67,7 @@ def plot_relaxation(relaxed: Relaxation, *, width: float | None = None) -> Figur
         shown = np.where((values > 0.0) & np.isfinite(values), values, np.nan)
         middle.plot(step, shown, dash, color=colour, label=name, **marker)
     middle.set_yscale("log")
-    middle.legend(frameon=False, fontsize=style.small)
+    middle.legend(frameon=False, fontsize=style.small, handlelength=1.4)
     state = "converged" if one.converged else "NOT CONVERGED"
     style.dress(middle, "step", "largest error", f"{state} in {one.iterations} steps")
     right.step(step, history.n_t1, where="post", color=BLUE, linewidth=1.4 * style.line)

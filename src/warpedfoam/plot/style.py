@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 COLUMN, PAGE, USUAL = 86.0, 180.0, 228.6
 #: Width of one of several panels.
 PANEL = 117.0
+#: Panels beside each other that are narrower (mm) are higher than wide.
+SMALL_PANEL = 75.0
 #: Narrower ones (mm) have their panels and legends one below the other.
 NARROW = 130.0
 #: Points of letters on one column and on the usual width; none are smaller than the least.
@@ -105,10 +107,16 @@ class Style:
             }
         )
 
+    def small_panels(self, count: int) -> bool:
+        """Whether so many panels beside each other are small."""
+        return not self.narrow and 25.4 * self.width / count < SMALL_PANEL
+
     def panels(self, count: int) -> tuple[Figure, list[Axes]]:
         """Panels beside each other, or flatter ones below each other on a narrow figure."""
         wide = self.width / (1 if self.narrow else count)
-        figure = self.figure(wide * 0.62 * count if self.narrow else wide * 0.87)
+        # so that legends have room
+        tall = 1.15 if self.small_panels(count) else 0.87
+        figure = self.figure(wide * 0.62 * count if self.narrow else wide * tall)
         rows, columns = (count, 1) if self.narrow else (1, count)
         return figure, [figure.add_subplot(rows, columns, k + 1) for k in range(count)]
 

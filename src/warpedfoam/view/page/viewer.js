@@ -332,14 +332,17 @@ window.foamViewer = {
   },
   /** Milliseconds each of `count` pictures takes, turning a little between them; at rest or while moving. */
   time: async (count, moving = false) => {
-    const { camera, canvas, painter, look } = await ready, out = [];
+    const viewer = await ready, { camera, canvas, painter } = viewer, out = [];
+    viewer.turning = moving;
+    painter.resize(...viewer.size, viewer.dots);
     for (let k = 0; k < count; k++) {
       camera.turn(6, 2, canvas.clientWidth, canvas.clientHeight);
       const began = performance.now();
-      painter.draw(camera, look, moving);
+      painter.draw(camera, viewer.look, moving);
       painter.finish();
       out.push(performance.now() - began);
     }
+    viewer.stirred();
     return out;
   },
   /** Milliseconds of the page's own work: a picture without its drawing, and going on to another frame. */
