@@ -25,6 +25,7 @@ from warpedfoam.relax.marking import with_markers
 from warpedfoam.relax.mixing import Mixing
 from warpedfoam.relax.reach import LOOKS, MUCH, UNDECIDED, next_reach, stiffer, turned_parts, which_way
 from warpedfoam.relax.result import Relaxation, RelaxationHistory
+from warpedfoam.relax.rims import RimMet, short_of_rim
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
 from warpedfoam.relax.system import (
     Linearised,
@@ -294,6 +295,9 @@ def _iterate(
         except SingularMatrixError:
             run.fault = SINGULAR
             return now, False
+        except RimMet as error:
+            run.fault = f"stopped: {error}"
+            return now, False
         except TopologyError as error:
             run.fault = f"stopped: outlines have met, and {error}"
             return now, False
@@ -332,6 +336,10 @@ def _advance(run: _Run, step: Step) -> None:
     """Apply a step film by film limited, then turn and realign films."""
     clock = Stopwatch(run.system.timings)
     cell, length = run.system.cell, run.system.length
+    exterior = run.system.exterior
+    if exterior is not None:
+        names, state = run.foam.bubble_ids, run.state
+        step = short_of_rim(cell, state, step, lambda one: _moved(run, one), exterior, length, names)
     if run.meet:
         step = _restrained(run, step)
     sweep = plan_sweep(cell, run.state, step, length, run.turns, run.system.shares, t1=run.t1)
