@@ -12,9 +12,9 @@ from warpedfoam.analysis import point_group
 from warpedfoam.cli.folders import output_folder
 from warpedfoam.cli.progress import Progress
 from warpedfoam.io import save, versions, write_columns_csv, write_record
+from warpedfoam.sizes import SIZES
 from warpedfoam.studies import MinimalPartition, minimal_partition
 from warpedfoam.studies.options import SurfaceOptions, options_from
-from warpedfoam.sizes import SIZES
 
 FOAM, TRIES, PICTURE, RECORD, STATE = "partition.npz", "tries.csv", "partition.png", "partition.json", "state"
 

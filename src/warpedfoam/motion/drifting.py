@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,12 @@ from warpedfoam.motion.changes import CHANGES, chords, cutoffs
 from warpedfoam.motion.drag import FrictionLaw
 from warpedfoam.motion.frames import new_trajectory
 from warpedfoam.motion.markers import spaced
-from warpedfoam.motion.meeting import crosses, marked
+from warpedfoam.motion.meeting import at_rim, crosses, marked
 from warpedfoam.motion.options import DriftOptions
 from warpedfoam.motion.result import Drift, DriftEvent
 from warpedfoam.motion.scene import Scene
 from warpedfoam.motion.stepper import StepFailed, Stepper
+from warpedfoam.relax.rims import RimMet
 from warpedfoam.relax.system import State
 
 #: First step, in λ ℓ²/γ; a step below the second share of that is no step.
@@ -46,6 +47,7 @@ TOO_SHORT = (
     "turn: one that ends in a marker, or of a bubble with three sides"
 )
 MET = "stopped: outlines have met at time {time:.6g}, and {fault}"
+RIM = "stopped at time {time:.6g}: {fault}"
 VANISHED = "stopped: bubble {name} has all but vanished at time {time:.6g}"
 
 
@@ -307,6 +309,8 @@ def _recall(run: _Run, path: Path) -> None:
     last = kept[-1]
     run.time, run.step, run.bound = times[-1], last["step"], last["bound"]
     run.count, run.rejected = last["count"], last["rejected"]
+    if foams[-1].n_bubbles != run.stepper.foam.n_bubbles:
+        run.stepper = run.stepper.of(foams[-1])
     run.state = run.stepper.state_of(foams[-1])
     run.noted = (len(run.log), len(run.events))
 
@@ -367,8 +371,13 @@ def _step(run: _Run, target: float) -> None:
             made = run.stepper.advance(run.state, time)
             if _lost(run, made.state):
                 raise StepFailed("a film shrinks too fast")
+            if at_rim(_scene(run), run.state, made.state):
+                raise StepFailed("an outline comes to the rim")
             if options.t1 and crosses(_scene(run), run.state, made.state):
                 raise StepFailed("outlines meet")
+        except RimMet as fault:
+            run.fault = RIM.format(time=run.time, fault=fault)
+            return
         except StepFailed as fault:
             run.step = FAILED[bool(run.fault)] * time
             run.bound = BELOW * time
@@ -456,13 +465,18 @@ def _changed(run: _Run, before: State) -> bool:
     stepper, energy = run.stepper, run.stepper.energy(run.state)
     for kind in CHANGES:
         for offer in kind(_scene(run), before, run.state):
+            moved, start = stepper, offer.state
+            if offer.foam is not None:
+                moved = stepper.of(offer.foam)
+                start = replace(start, pressures=stepper.scale / moved.scale * start.pressures)
             try:
-                state = stepper.on_volumes(offer.state)
+                state = moved.on_volumes(start)
             except StepFailed:
                 continue
-            after = stepper.energy(state)
+            after = moved.energy(state)
             if not after < energy:
                 continue
+            run.stepper = moved
             run.events.append(
                 DriftEvent(
                     run.time,
@@ -477,6 +491,6 @@ def _changed(run: _Run, before: State) -> bool:
             )
             run.state = state
             # what is new moves fast
-            run.step = min(run.step, FIRST * stepper.time_scale)
+            run.step = min(run.step, FIRST * moved.time_scale)
             return True
     return False

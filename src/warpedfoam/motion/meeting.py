@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpedfoam.arrays import Floats
 from warpedfoam.errors import TopologyError
 from warpedfoam.motion.scene import Candidate, Scene
 from warpedfoam.moves.markers import Layout
-from warpedfoam.relax.contacts import make_contacts, restrained, waiting
+from warpedfoam.relax.contacts import make_contacts, restrained, shares_of, waiting
 from warpedfoam.relax.marking import with_markers
+from warpedfoam.relax.rims import CLOSE, TOUCH, met_rim, rim_gap
 from warpedfoam.relax.system import State
 
 
@@ -28,6 +30,30 @@ def crosses(scene: Scene, before: State, after: State) -> bool:
     end = after.points, after.offsets
     share = restrained(scene.cell, layout_of(before), end, exterior, scene.length, scene.shares)
     return share < 1.0
+
+
+def at_rim(scene: Scene, before: State, after: State) -> bool:
+    """Whether a step leads outlines to the rim, and has to be shorter.
+
+    Raises
+    ------
+    RimMet
+        If they are there.
+    """
+    exterior, surface = scene.foam.exterior, scene.cell.surface
+    if exterior is None or surface.rim is None:
+        return False
+
+    def look(state: State) -> tuple[float, int, Floats]:
+        return rim_gap(scene.cell, state.network, state.points, state.offsets, exterior, scene.length)
+
+    ahead = look(after)[0]
+    if ahead >= TOUCH:
+        return False
+    now, bubble, at = look(before)
+    if now < CLOSE and not ahead > now:
+        raise met_rim(scene.bubble_ids, bubble, at)
+    return not ahead > now
 
 
 def marked(scene: Scene, state: State) -> State:
@@ -48,7 +74,7 @@ def meet_outlines(scene: Scene, _before: State, state: State) -> Iterator[Candid
     Raises
     ------
     TopologyError
-        If they cannot be joined, or would enclose a region: a drift's bubbles are counted at its start.
+        If they cannot be joined.
     """
     foam, exterior = scene.foam, scene.foam.exterior
     if exterior is None:
@@ -66,12 +92,15 @@ def meet_outlines(scene: Scene, _before: State, state: State) -> Iterator[Candid
     found = make_contacts(now)
     if found.refused:
         raise TopologyError(found.refused)
-    if found.foam.n_bubbles != foam.n_bubbles:
-        raise TopologyError("they enclose a part of the exterior, which would be a new bubble")
     if not found.events:
         return
     after = found.foam
-    fresh = State(after.network, after.vertex_points, after.film_offsets, state.pressures)
+    # a region that is enclosed is a bubble of its own, the last
+    grown = after.n_bubbles - foam.n_bubbles
+    pressures = np.append(state.pressures, np.zeros(grown))
+    fresh = State(after.network, after.vertex_points, after.film_offsets, pressures)
+    if grown:
+        scene = replace(scene, foam=after, shares=shares_of(after))
     joins = [event for event in found.events if event.kind == "join"]
     parts = [event for event in found.events if event.kind == "part"]
     yield Candidate(
@@ -80,4 +109,5 @@ def meet_outlines(scene: Scene, _before: State, state: State) -> Iterator[Candid
         tuple(i for event in parts for i in event.bubbles),
         tuple(i for event in joins for i in event.bubbles),
         found.events[0].position,
+        after if grown else None,
     )

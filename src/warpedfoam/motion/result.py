@@ -116,8 +116,14 @@ class Drift:
 
     @cached_property
     def centres(self) -> Floats:
-        """Centre of each bubble in each frame, (n, n_bubbles, 3); see `Foam.bubble_centres`."""
-        return frozen(np.stack([foam.bubble_centres for foam in self.foams]))
+        """Centre of each bubble in each frame, (n, n_bubbles, 3); see `Foam.bubble_centres`.
+
+        NaN for a bubble that was not there yet: the last ones, which contacts have enclosed.
+        """
+        out = np.full((len(self.foams), max(foam.n_bubbles for foam in self.foams), 3), np.nan)
+        for k, foam in enumerate(self.foams):
+            out[k, : foam.n_bubbles] = foam.bubble_centres
+        return frozen(out)
 
 
 def _volume_error(foam: Foam) -> float:

@@ -38,13 +38,17 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A state of another topology, its volumes not yet right; who loses and gains a side, and where."""
+    """A state of another topology, its volumes not yet right; who loses and gains a side, and where.
+
+    ``foam`` is given if there are other bubbles than before, with their names and volumes.
+    """
 
     kind: str
     state: State
     losers: tuple[int, ...]
     gainers: tuple[int, ...]
     position: tuple[float, float, float]
+    foam: Foam | None = None
 
 
 #: Offers candidates from the states before and after a step, both of one network.

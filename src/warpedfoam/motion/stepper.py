@@ -26,6 +26,9 @@ FORCE, VOLUME = 1e-10, 3e-12
 #: Newton steps of an Euler step, and with yield friction; the largest in bubble sizes, and the largest
 #: change of a chord in chords.
 NEWTON, STICKING, REACH, TURN = 14, 60, 0.3, 0.5
+#: Kinks at markers, after clusters have met, make Newton's method linear: more steps as long as a share of
+#: the force goes in each.
+PATIENT, FALLING = 45, 0.7
 #: With yield friction a step goes to where this share of the force along it is left, found in so many looks.
 SLACK, SEARCHES = 0.3, 12
 #: Steps that bring a foam to its volumes.
@@ -77,6 +80,10 @@ class Stepper:
         self.unit = foam.tension * self.system.film_unit
         self.scale = self.unit / self.system.mean_volume
         self.rounding = ROUND if self.system.invariant else ROUGH
+
+    def of(self, foam: Foam) -> Stepper:
+        """A stepper by the same law for a foam of other bubbles."""
+        return Stepper(foam, self.law, hold_volumes=self.hold_volumes, method=self.method)
 
     @property
     def length(self) -> float:
@@ -216,10 +223,13 @@ class Stepper:
         return state
 
     def _newton(self, state: State, drag: Drag) -> State:
-        convex = True
-        for _ in range(STICKING if self.law.yielding else NEWTON):
+        convex, last = True, np.inf
+        for k in range(STICKING if self.law.yielding else PATIENT):
             lin = self._linearised(state, drag)
             now = lin.residuals
+            if k >= NEWTON and not self.law.yielding and now.force > FALLING * last:
+                break
+            last = now.force
             if not np.isfinite(now.force):
                 raise StepFailed("a film has degenerated")
             if lin.slip > self.foam.cell.surface.precision:

@@ -14,6 +14,7 @@ from warpedfoam.foam import MAX_ORDER, Foam
 from warpedfoam.relax.layered import relax_layers, require_lines
 from warpedfoam.relax.linear import SingularMatrixError, factoriser
 from warpedfoam.relax.result import Relaxation, RelaxationHistory
+from warpedfoam.relax.rims import RimMet
 from warpedfoam.relax.steps import (
     EXACT_ABOVE,
     EXACT_BELOW,
@@ -237,6 +238,9 @@ def _iterate(
                 proximal_step(run, lin)
         except SingularMatrixError:
             run.fault = SINGULAR
+            return now, False
+        except RimMet as error:
+            run.fault = f"stopped: {error}"
             return now, False
         except TopologyError as error:
             run.fault = f"stopped: outlines have met, and {error}"

@@ -19,6 +19,7 @@ from warpedfoam.relax.kkt import KKT
 from warpedfoam.relax.marking import with_markers
 from warpedfoam.relax.mixing import Mixing
 from warpedfoam.relax.reach import LOOKS, MUCH, UNDECIDED, next_reach, stiffer, turned_parts, which_way
+from warpedfoam.relax.rims import short_of_rim
 from warpedfoam.relax.sweep import LIMITS, plan_sweep, realigned, turned
 from warpedfoam.relax.system import Linearised, State, Step, Stopwatch, System, one_ring, pinned_unknowns
 from warpedfoam.relax.wall_sweep import stood_up, turned_walls
@@ -101,6 +102,10 @@ def _advance(run: Run, step: Step) -> None:
     """Apply a step film by film limited, then turn and realign films."""
     clock = Stopwatch(run.system.timings)
     cell, length = run.system.cell, run.system.length
+    exterior = run.system.exterior
+    if exterior is not None:
+        names, state = run.foam.bubble_ids, run.state
+        step = short_of_rim(cell, state, step, lambda one: _moved(run, one), exterior, length, names)
     if run.meet:
         step = _restrained(run, step)
     sweep = plan_sweep(cell, run.state, step, length, run.turns, run.system.shares, t1=run.t1)
