@@ -11,6 +11,7 @@ import os
 import sys
 import tempfile
 import time
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 GAP_SHARE, N_BUBBLES, ORDER, STEPS = 0.01, 60, 2, 80
 #: Nodes of the meshes that carry integrals and distances: fewer than by default, to be quick.
 INTEGRAL_NODES, FOAM_NODES = 300, 900
+#: Half of the cases go through the compiled loops, as if their meshes had the nodes that call for them.
+COMPILED = 50
 MEMORY = 4 << 30
 
 Mesh = tuple[np.ndarray, np.ndarray]
@@ -469,8 +472,10 @@ def main() -> None:
         pass
     import warnings
 
+    from warpedfoam.kernels import jets
     from warpedfoam.surfaces.level import LevelSurface
 
+    many = jets.MANY
     LevelSurface.integral_nodes = INTEGRAL_NODES
     warnings.simplefilter("error")
     answers = os.fdopen(os.dup(1), "w")
@@ -479,6 +484,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for line in sys.stdin:
             start = time.perf_counter()
+            jets.MANY = COMPILED if zlib.crc32(line.strip().encode()) % 2 else many
             try:
                 result = outcome(line.strip(), Path(folder), known)
             except Exception as fault:

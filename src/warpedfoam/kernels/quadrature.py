@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from warpedfoam.arrays import Floats, frozen
+
+#: So many places or fewer are remembered with their interpolation.
+FEW = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +39,28 @@ class LobattoRule:
     products: Floats
 
     def interpolation(self, xi: Floats) -> Floats:
-        """Matrix (m, p + 1) from nodal values to values at the points ``xi`` in [0, 1]."""
+        """Matrix (m, p + 1) from nodal values to values at the points ``xi`` in [0, 1]; read-only."""
+        at = np.asarray(xi, dtype=np.float64)
+        return _interpolation(self.order, at.tobytes()) if at.size <= FEW else self._interpolated(at)
+
+    @cached_property
+    def _barycentric(self) -> Floats:
         gaps = self.nodes[:, None] - self.nodes[None, :]
         np.fill_diagonal(gaps, 1.0)
-        bary = 1.0 / gaps.prod(axis=1)
-        diff = np.asarray(xi)[:, None] - self.nodes[None, :]
+        return frozen(1.0 / gaps.prod(axis=1))
+
+    def _interpolated(self, xi: Floats) -> Floats:
+        diff = xi[:, None] - self.nodes[None, :]
         hit = np.abs(diff) < 1e-14
         rows = np.any(hit, axis=1, keepdims=True)
-        parts = np.where(rows, hit, bary / np.where(hit, 1.0, diff))
-        out: Floats = parts / parts.sum(axis=1, keepdims=True)
-        return out
+        parts = np.where(rows, hit, self._barycentric / np.where(hit, 1.0, diff))
+        return frozen(parts / parts.sum(axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=256)
+def _interpolation(order: int, places: bytes) -> Floats:
+    """The same few places are asked for again and again: those of a rule."""
+    return lobatto(order)._interpolated(np.frombuffer(places))
 
 
 @lru_cache(maxsize=64)

@@ -111,12 +111,14 @@ def _refitted(cell: HeleShawCell, state: State, films: Ints, points: Floats, cha
     offsets = state.offsets[films].copy()
     s = np.tile(inner, len(films))
 
-    def nodes(u: Floats) -> Floats:
-        return surface.arc_points(tail, head, u, inner).reshape(-1, 3)
+    def nodes(*tries: Floats) -> Floats:
+        # all at once: for few films a call costs more than what it computes
+        first, last = (np.tile(end, (len(tries), 1)) for end in (tail, head))
+        return surface.arc_points(first, last, np.concatenate(tries), inner).reshape(len(tries), -1, 3)
 
     for _ in range(STEPS):
-        here = nodes(offsets)
-        across = (nodes(offsets + DIFFERENCE) - nodes(offsets - DIFFERENCE)) / (2.0 * DIFFERENCE)
+        here, ahead, behind = nodes(offsets, offsets + DIFFERENCE, offsets - DIFFERENCE)
+        across = (ahead - behind) / (2.0 * DIFFERENCE)
         old, along = chain.look(film, s)
         fault = nearest_image(here - old, surface.period)
         # least squares in the tangent plane: here + across du = old + along ds
@@ -132,5 +134,5 @@ def _refitted(cell: HeleShawCell, state: State, films: Ints, points: Floats, cha
         if float(np.abs(du).max()) < FOUND:
             break
     old, _ = chain.look(film, s)
-    away = np.linalg.norm(nearest_image(nodes(offsets) - old, surface.period), axis=1)
+    away = np.linalg.norm(nearest_image(nodes(offsets)[0] - old, surface.period), axis=1)
     return offsets if float((away / span[film]).max()) < 1e-9 else None
