@@ -13,7 +13,7 @@ from warpedfoam.errors import FileFormatError
 from warpedfoam.foam import Foam
 from warpedfoam.io.atomic import PathLike, as_path
 from warpedfoam.io.evolver_forms import rest_of
-from warpedfoam.io.reading import text_of
+from warpedfoam.io.reading import brief, text_of
 
 _FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _ENERGY = re.compile(rf"^// Total energy:\s*({_FLOAT})\s*$", re.MULTILINE)
@@ -112,7 +112,7 @@ def read_dmp(path: PathLike) -> EvolverDump:
     try:
         return _dump(text)
     except FileFormatError as fault:
-        raise FileFormatError(f"cannot read {source}: {fault}") from None
+        raise FileFormatError(f"cannot read {source}: {brief(fault)}") from None
 
 
 def _dump(text: str) -> EvolverDump:
