@@ -10,8 +10,8 @@ its films as 4, 8 and 16 chords then go to the Evolver, which solves from there 
 last two levels are extrapolated in chord length squared; the error of that is taken from the first two.
 
 Surfaces from formulas are a landscape whose sides are joined, others that end in rims, a closed implicit one
-and Schwarz's P. There are two levels, since volumes are long polynomials; the error given is a tenth of
-what the extrapolation adds.
+and Schwarz's P. There are two levels, since volumes are long polynomials; what extrapolation adds is
+given beside the difference that is left.
 
 Films free to bulge go to the Evolver as its soapfilm model in quadratic elements, 4, 8 and 16 to a film
 and 1, 2 and 4 from plate to plate. Where the lines meet the plates films have weak corners, so that the
@@ -147,7 +147,7 @@ def bulging(kind: str, count: int, seed: int, gap: float, folder: Path) -> tuple
 def formula_table(only: str | None) -> None:
     """Energies and pressures on surfaces from formulas, by 4 and 8 chords a film."""
     print(
-        "| foam | energy: 8 chords | extrapolated | its error | pressures | their error "
+        "| foam | energy: 8 chords | extrapolated | added by that | pressures | added "
         "| we | Evolver: 4 | 8 chords |"
     )
     print("| --- " * 9 + "|")
@@ -168,12 +168,12 @@ def formula_table(only: str | None) -> None:
                 times.append(seconds)
             limit, p = extrapolated(energies)[0], extrapolated(pressures)[0]
             spread = np.ptp(ours.pressures)
-            error = abs(energies[1] - energies[0]) / 30.0 / ours.energy
+            added = abs(energies[1] - energies[0]) / 3.0 / ours.energy
             print(
                 f"| {kind}, {count} | {abs(energies[1] / ours.energy - 1.0):.1e} "
-                f"| {abs(limit / ours.energy - 1.0):.1e} | {error:.1e} "
+                f"| {abs(limit / ours.energy - 1.0):.1e} | {added:.1e} "
                 f"| {np.abs(p - ours.pressures).max() / spread:.1e} "
-                f"| {np.abs(pressures[1] - pressures[0]).max() / 30.0 / spread:.1e} "
+                f"| {np.abs(pressures[1] - pressures[0]).max() / 3.0 / spread:.1e} "
                 f"| {took:.2f} s | {times[0]:.2f} s | {times[1]:.2f} s |",
                 flush=True,
             )
