@@ -2,11 +2,16 @@
 
     python benchmarks/against_evolver.py                 the table
     python benchmarks/against_evolver.py --bulging       the table of films free to bulge
+    python benchmarks/against_evolver.py --formulas      the table of surfaces from formulas
     python benchmarks/against_evolver.py --record DIR    also the foams and the Evolver's answers, for tests
 
 Needs the program ``evolver`` (Debian: evolver-nox). Each foam is relaxed by warpedfoam from Voronoi cells;
 its films as 4, 8 and 16 chords then go to the Evolver, which solves from there by its own Newton steps. The
 last two levels are extrapolated in chord length squared; the error of that is taken from the first two.
+
+Surfaces from formulas are a landscape whose sides are joined, others that end in rims, a closed implicit one
+and Schwarz's P. There are two levels, since volumes are long polynomials; what extrapolation adds is
+given beside the difference that is left.
 
 Films free to bulge go to the Evolver as its soapfilm model in quadratic elements, 4, 8 and 16 to a film
 and 1, 2 and 4 from plate to plate. Where the lines meet the plates films have weak corners, so that the
@@ -34,6 +39,24 @@ SIZES, GAP, ORDER, SEED = (12, 50, 200), 0.1, 8, 0
 LEVELS, STEPS = (4, 8, 16), 5
 #: Surface, bubbles, seed, gap: small foams whose films bulge.
 BULGING = (("sphere", 8, 1, 0.3), ("torus", 12, 15, 0.1), ("torus", 12, 15, 0.3))
+
+K = "cos(pi*x/2)"
+#: Surfaces from formulas, and bubbles.
+FORMULAS = {
+    "hills, joined": (lambda: wf.Graph.from_formula(f"0.2*{K}*sin(pi*y/2)", 4.0, 4.0, periodic=True), 14),
+    "ridge, joined": (lambda: wf.Graph.from_formula(f"0.2*{K}", 4.0, 3.0, periodic=True), 12),
+    "sheet, four sides": (lambda: wf.Graph.from_formula("0.1*x**2 - 0.15*y**2 + 0.05*x*y", 4.0, 3.0), 12),
+    "bowl, round rim": (lambda: wf.Graph.from_formula("0.1*(x**2 + y**2)", 4.0, 4.0, disk=True), 12),
+    "vase, two rims": (lambda: wf.Revolution.from_formula("(1 + 0.2*sin(2*z))**2", -1.0, 1.5), 14),
+    "cup, a pole": (lambda: wf.Revolution.from_formula("1 - z**2/2", -(2.0**0.5), 0.7), 12),
+    "implicit egg": (
+        lambda: wf.Implicit.from_formula(
+            "x**2 + y**2/1.44 + z**2/0.81 + 0.1*x*y*z - 1", [[-1.8] * 3, [1.8] * 3]
+        ),
+        16,
+    ),
+    "Schwarz P": (lambda: wf.SchwarzP(2.0), 64),
+}
 
 
 def evolved(path: Path, steps: int = STEPS, timeout: float = 300.0) -> tuple[wf.EvolverDump, float, bool]:
@@ -121,6 +144,41 @@ def bulging(kind: str, count: int, seed: int, gap: float, folder: Path) -> tuple
     return row, ours.foam
 
 
+def formula_table(only: str | None) -> None:
+    """Energies and pressures on surfaces from formulas, by 4 and 8 chords a film."""
+    print(
+        "| foam | energy: 8 chords | extrapolated | added by that | pressures | added "
+        "| we | Evolver: 4 | 8 chords |"
+    )
+    print("| --- " * 9 + "|")
+    with tempfile.TemporaryDirectory() as name:
+        for kind, (surface, count) in FORMULAS.items():
+            if only is not None and only not in kind:
+                continue
+            raw = wf.voronoi_foam(wf.HeleShawCell(surface(), GAP), count, seed=2, lloyd=2)
+            start = time.perf_counter()
+            ours = wf.relax(raw, order=ORDER)
+            took = time.perf_counter() - start
+            energies, pressures, times = [], [], []
+            for segments in LEVELS[:2]:
+                path = wf.write_fe(Path(name) / f"{segments}.fe", ours.foam, segments=segments)
+                dump, seconds, _ = evolved(path, timeout=900.0)
+                energies.append(dump.energy)
+                pressures.append(dump.bubble_pressures(ours.foam))
+                times.append(seconds)
+            limit, p = extrapolated(energies)[0], extrapolated(pressures)[0]
+            spread = np.ptp(ours.pressures)
+            added = abs(energies[1] - energies[0]) / 3.0 / ours.energy
+            print(
+                f"| {kind}, {count} | {abs(energies[1] / ours.energy - 1.0):.1e} "
+                f"| {abs(limit / ours.energy - 1.0):.1e} | {added:.1e} "
+                f"| {np.abs(p - ours.pressures).max() / spread:.1e} "
+                f"| {np.abs(pressures[1] - pressures[0]).max() / 3.0 / spread:.1e} "
+                f"| {took:.2f} s | {times[0]:.2f} s | {times[1]:.2f} s |",
+                flush=True,
+            )
+
+
 def bulging_table(record: Path | None) -> None:
     """Saved by bulging, in both programs, and the times."""
     print(
@@ -153,10 +211,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--record", type=Path, help="folder for foams and answers")
     parser.add_argument("--bulging", action="store_true", help="films free to bulge")
+    parser.add_argument("--formulas", action="store_true", help="surfaces from formulas")
+    parser.add_argument("--only", help="with --formulas: those whose name holds this")
     given = parser.parse_args()
     record = given.record
     if shutil.which("evolver") is None:
         raise SystemExit("the program evolver is not installed (Debian: apt-get install evolver-nox)")
+    if given.formulas:
+        formula_table(given.only)
+        return
     if given.bulging:
         bulging_table(record)
         return

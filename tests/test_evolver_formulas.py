@@ -41,6 +41,10 @@ SURFACES = {
     "vase": (lambda: wf.Revolution.from_formula("(1 + 0.2*sin(2*z))**2", -1.0, 1.5), 14),
     "cup": (lambda: wf.Revolution.from_formula("1 - z**2/2", -(2.0**0.5), 0.7), 12),
 }
+MOVING = {
+    "ball": (lambda: wf.Implicit.from_formula("x**2 + y**2 + z**2 - 1", [[-1.5] * 3, [1.5] * 3]), 12),
+    "flat": (lambda: wf.Graph.from_formula("0*x", 4.0, 3.0, periodic=True), 12),
+}
 NAMESPACE = {
     name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 } | {"atan2": np.arctan2, "floor": np.floor}
@@ -53,7 +57,7 @@ def valued(text: str, places: dict[str, np.ndarray]) -> np.ndarray:
 
 @cache
 def raw(name: str) -> wf.Foam:
-    surface, count = SURFACES[name]
+    surface, count = (SURFACES | MOVING)[name]
     return wf.voronoi_foam(wf.HeleShawCell(surface(), 0.1), count, seed=2, lloyd=2)
 
 
@@ -121,7 +125,9 @@ def test_the_texts_are_the_foams_volumes_and_energy(name: str, ruled: bool) -> N
         assert energy == pytest.approx(foam.energy, rel=1e-6)
 
 
-@pytest.mark.parametrize(("name", "count"), [("bowl", 1), ("ridge", 1), ("hills", 0), ("vase", 1)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("bowl", 1), ("ridge", 1), ("hills", 0), ("vase", 1), ("ball", 3), ("flat", 2)]
+)
 def test_motions_are_held_back(name: str, count: int) -> None:
     foam = raw(name)
     held = held_back(foam)
