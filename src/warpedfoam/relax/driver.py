@@ -45,7 +45,10 @@ SLIPPED = (
     "inside out; use more bubbles, volumes that differ less, or more marker vertices"
 )
 SINGULAR = "stopped: the Newton matrix is singular"
-DEGENERATE = "stopped: a force became infinite or undefined, a film has degenerated"
+DEGENERATE = (
+    "stopped: a force became infinite or undefined, a film has degenerated; begin with more even seeds "
+    "(seeds='blue', or lloyd=5) or more bubbles"
+)
 
 
 def relax(
