@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_indices, as_instance, as_integer, as_number, as_points
 from warpedfoam.cell import HeleShawCell
@@ -18,15 +16,13 @@ from warpedfoam.io.atomic import PathLike, as_path
 from warpedfoam.io.evolver_polygons import evolver_polygons
 from warpedfoam.io.polygon_files import Polygons, obj_polygons, ply_polygons
 from warpedfoam.io.reading import brief, existing
+from warpedfoam.io.welding import welded, without_repeats
 from warpedfoam.kernels.periodic import nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.network import CellNetwork, network_from_loops
-from warpedfoam.surfaces.places import Places
 
 #: Steps of the fit of films to their points, and its smallest change worth another.
 _FIT_STEPS, _FIT_CHANGE = 12, 1e-14
-#: Points to be welded to each, in the mean, beyond which a file is no network.
-_MOST_PAIRS = 64
 #: In sizes of the surface, how far a point may be to be looked at.
 _FAR = 1e9
 
@@ -160,10 +156,10 @@ def _foam(
     ]
     unit = float(np.sqrt(cell.surface.area / len(loops)))
     on = _projected(cell, x, np.unique(np.concatenate(loops)), tolerance * unit)
-    merged = _welded(on, weld * unit, cell.surface.period)
+    merged = welded(on, weld * unit, cell.surface.period)
     sizes = np.array([len(loop) for loop in loops])
     corners = merged[np.concatenate(loops)]
-    corners, sizes = _without_repeats(corners, sizes)
+    corners, sizes = without_repeats(corners, sizes)
     if (sizes < 3).any():
         bad = int(np.flatnonzero(sizes < 3)[0])
         raise TopologyError(f"polygon {bad} has {int(sizes[bad])} different corners; it needs three")
@@ -321,36 +317,6 @@ def _projected(cell: HeleShawCell, points: Floats, used: Ints, allowed: float) -
             f"and {allowed:.3g} is allowed; choose the surface that fits or a larger tolerance"
         )
     return out
-
-
-def _welded(points: Floats, distance: float, period: Floats | None) -> Ints:
-    """The first point at the place of each point."""
-    # points at the very same place first: their pairs would be the square of their number
-    _, kept, which = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    places, n = Places(points[kept], period), len(kept)
-    if places.count(distance) > _MOST_PAIRS * n:
-        raise TopologyError(
-            f"the {len(points)} points crowd: over {_MOST_PAIRS} lie within {distance:.3g} of each, in the "
-            "mean; the file is damaged, or weld is too large"
-        )
-    pairs = places.pairs(distance)
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    label = label[which.reshape(-1)]
-    first = np.full(int(label.max()) + 1, len(points))
-    np.minimum.at(first, label, np.arange(len(points)))
-    out: Ints = first[label]
-    return out
-
-
-def _without_repeats(corners: Ints, sizes: Ints) -> tuple[Ints, Ints]:
-    """Polygons without corners that repeat the one before."""
-    starts = np.cumsum(sizes) - sizes
-    before = np.arange(len(corners)) - 1
-    before[starts] = starts + sizes - 1
-    keep = corners != corners[before]
-    loop = np.repeat(np.arange(len(sizes)), sizes)
-    return corners[keep], np.bincount(loop[keep], minlength=len(sizes))
 
 
 def _turned(cell: HeleShawCell, points: Floats, corners: Ints, sizes: Ints) -> bool:
