@@ -12,7 +12,8 @@ from warpedfoam.io import write_mesh
 from warpedfoam.surfaces import FlatTorus, TriangleMesh, mesh_report, read_mesh, repaired
 from warpedfoam.surfaces.level import LevelSurface
 
-from .mutated_meshes import FORMATS, MUTATIONS, base
+from .mesh_mutations import MUTATIONS, base
+from .scrambled_files import FORMATS
 
 NODES, TRIANGLES = base("sphere")
 BALL = TriangleMesh(NODES, TRIANGLES)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpedfoam.arrays import Bools, Floats, Ints, as_generator, as_integer, as_points, frozen
-from warpedfoam.errors import MeshError
 from warpedfoam.kernels import height_arcs as arcs
 from warpedfoam.kernels.fans import fan_integrals
 from warpedfoam.kernels.gap_films import swept_change, varied_measure, varied_terms
@@ -20,10 +19,9 @@ from warpedfoam.kernels.nodal import bump_offsets
 from warpedfoam.kernels.periodic import loop_shifts, nearest_image
 from warpedfoam.kernels.quadrature import lobatto
 from warpedfoam.kernels.shapes import bent_mean_gauss, mean_gauss, normal_shape
-from warpedfoam.kernels.thinning import accepted
 from warpedfoam.surfaces.mesh import TriangleMesh
 from warpedfoam.surfaces.patches import PatchedMesh, Quadrature
-from warpedfoam.surfaces.places import Places
+from warpedfoam.surfaces.places import Places, spread_out
 from warpedfoam.surfaces.protocol import ArcTerms, Layer
 from warpedfoam.surfaces.rim import Rim, with_walls
 
@@ -298,7 +296,7 @@ class LevelSurface(ABC):
         """Centres of even cells: Lloyd's method on fixed pseudo-random points."""
         n = as_integer(count, "count", minimum=1)
         crowd = self._patches.random_points(40 * n, np.random.default_rng(0))
-        centres = crowd[_spread_out(crowd[: 10 * n], n, float(np.sqrt(self.area / n)), self.period)]
+        centres = crowd[spread_out(crowd[: 10 * n], n, float(np.sqrt(self.area / n)), self.period)]
         for _ in range(LATTICE_ROUNDS):
             _, owner = Places(centres, self.period).nearest(crowd)
             size = np.bincount(owner, minlength=n)
@@ -470,36 +468,9 @@ class LevelSurface(ABC):
         return fan_integrals(placed.rule, points, loops, shifts, self.foot, land, self._unit, rays)
 
 
-def _spread_out(points: Floats, count: int, spacing: float, period: Floats | None) -> Ints:
-    """The first ``count`` of points thinned to the widest gaps that leave so many."""
-    places = Places(points, period)
-    for share in (0.8, 0.75, 0.7, 0.65, 0.6, 0.5):
-        chosen = np.flatnonzero(accepted(len(points), places.pairs(share * spacing).T))
-        if len(chosen) >= count:
-            return chosen[:count]
-    return np.arange(count)
-
-
 def _generators(points: Floats, size: float) -> Floats:
     """Three translations and three rotations at the points, (6, n, 3), of similar strength."""
     axes = np.eye(3)
     shifts = np.broadcast_to(axes[:, None], (3, len(points), 3))
     turns = np.cross(axes[:, None], points[None]) / size
     return np.concatenate([shifts, turns])
-
-
-def require_meshable(mesh: TriangleMesh, chi: int) -> TriangleMesh:
-    """The mesh, if it is a closed manifold of Euler characteristic ``chi``.
-
-    Raises
-    ------
-    MeshError
-        If it is not: it was made too coarse for the surface.
-    """
-    mesh.require_surface(closed=True)
-    if mesh.euler_characteristic != chi:
-        raise MeshError(
-            f"the triangulation has Euler characteristic {mesh.euler_characteristic}, the surface {chi}; "
-            "ask for more nodes"
-        )
-    return mesh

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from warpedfoam.arrays import Floats, Ints
+from warpedfoam.kernels.thinning import accepted
 
 
 class Places:
@@ -41,3 +42,13 @@ class Places:
         pairs = self._tree.query_pairs(radius, output_type="ndarray")
         out: Ints = np.sort(pairs, axis=1).astype(np.int64)
         return out
+
+
+def spread_out(points: Floats, count: int, spacing: float, period: Floats | None) -> Ints:
+    """The first ``count`` of points thinned to the widest gaps that leave so many."""
+    places = Places(points, period)
+    for share in (0.8, 0.75, 0.7, 0.65, 0.6, 0.5):
+        chosen = np.flatnonzero(accepted(len(points), places.pairs(share * spacing).T))
+        if len(chosen) >= count:
+            return chosen[:count]
+    return np.arange(count)
