@@ -293,7 +293,7 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
     Parts of a foam that no films join move on their own, and turn where the surface is flat.
     """
     modes = cell.rigid_motions(state.points)
-    network = state.network
+    network, copies = state.network, 1
     if (network.bubble_euler != 1).any() or len(network.markers):
         links = coo_array(
             (np.ones(network.n_films), (network.tails, network.heads)), shape=(network.n_vertices,) * 2
@@ -304,8 +304,11 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
             turning = np.cross(cell.surface.normals(state.points), points)
             # what goes round the surface cannot turn
             modes = np.concatenate([modes, np.where(round_[part][:, None], 0.0, turning)[None]])
+        strength, copies = np.abs(modes).max(axis=(1, 2), initial=0.0), count
         own = part == np.arange(count)[:, None]
         modes = (modes[None] * own[:, None, :, None]).reshape(-1, *state.points.shape)
+    else:
+        strength = np.abs(modes).max(axis=(1, 2), initial=0.0)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     whole = np.linalg.norm(matrix, axis=(1, 2))
@@ -314,9 +317,10 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
         across = held.directions
         matrix[:, held.vertices] -= np.einsum("kmi,mi,mj->kmj", matrix[:, held.vertices], across, across)
     flat: Floats = matrix.reshape(len(modes), 2 * state.network.n_vertices)
+    # against the whole motion, whose unit is that of its surface: lengths for some, their inverse for others;
     # a motion along the films alone, such as a lone bubble's turning, has next to nothing left
     size = np.linalg.norm(flat, axis=1)
-    kept: Floats = flat[(size > 1e-6 * cell.surface.size) & (size > SLIDES * whole)]
+    kept: Floats = flat[(size > 1e-6 * np.tile(strength, copies)) & (size > SLIDES * whole)]
     return kept
 
 
