@@ -325,8 +325,11 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
         if cell.surface.rim is not None:
             # what touches no rim does not mind its moving
             kinds = [(modes, own[bound]), (cell.free_motions(state.points), own[~bound])]
+        strength = np.concatenate([np.tile(_strength(some), len(mine)) for some, mine in kinds])
         parts = [(some[None] * mine[:, None, :, None]).reshape(-1, *some.shape[1:]) for some, mine in kinds]
         modes = np.concatenate(parts)
+    else:
+        strength = _strength(modes)
     frames = cell.surface.vertex_frames(state.points)
     matrix = np.einsum("kvx,vix->kvi", modes, frames)
     whole = np.linalg.norm(matrix, axis=(1, 2))
@@ -335,10 +338,17 @@ def rigid_modes(cell: HeleShawCell, state: State) -> Floats:
         across = held.directions
         matrix[:, held.vertices] -= np.einsum("kmi,mi,mj->kmj", matrix[:, held.vertices], across, across)
     flat: Floats = matrix.reshape(len(modes), 2 * state.network.n_vertices)
+    # against the whole motion, whose unit is that of its surface: lengths for some, their inverse for others;
     # a motion along the films alone, such as a lone bubble's turning, has next to nothing left
     size = np.linalg.norm(flat, axis=1)
-    kept: Floats = flat[(size > 1e-6 * cell.surface.size) & (size > SLIDES * whole)]
+    kept: Floats = flat[(size > 1e-6 * strength) & (size > SLIDES * whole)]
     return kept
+
+
+def _strength(modes: Floats) -> Floats:
+    """Largest step of any vertex in each motion (k, n_vertices, 3)."""
+    out: Floats = np.abs(modes).max(axis=(1, 2), initial=0.0)
+    return out
 
 
 def parts_of(network: CellNetwork) -> Ints:
