@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import warpedfoam as wf
+from warpedfoam.moves.enclosed import Half, _holds
 from warpedfoam.relax.contacts import WINDOW, _loose, shares_of
 from warpedfoam.relax.outlines import MEET, Outlines, facing, met, safe_share
 
@@ -122,3 +123,35 @@ def test_films_let_go_unless_they_are_pulled_open() -> None:
     points = double.vertex_points.copy()
     points[ends] = 0.4 * points[ends] + 0.6 * points[ends].mean(axis=0)
     assert loose(replace(double, vertex_points=points), 1e3).tolist() == []
+
+
+def test_what_lies_left_of_a_loop() -> None:
+    """Beside a long bubble: not in it, hence in all the rest; what is in it is not in the rest."""
+    cell = wf.HeleShawCell(wf.Sphere(10.0), gap=0.5)
+    spots = np.array([[10.0, 0.0, 0.0], [10.0, 0.0, 1.6], [-10.0, 0.0, 0.0]])
+    foam = wf.cluster_foam(cell, [1, 1, 1], volumes=0.5, centre=spots, order=4)
+    net, exterior = foam.network, foam.exterior
+    owner = net.bubble[np.arange(len(net.bubble)) ^ 1]
+    outer = net.bubble == exterior
+    rings = [np.flatnonzero(outer & (owner == bubble)) for bubble in range(3)]
+    # the loop round the first, drawn out to an ellipse across the way to the second; in order
+    half = start = int(rings[0][0])
+    loop = [half]
+    while (half := int(net.next[half])) != start:
+        loop.append(half)
+    points = foam.vertex_points.copy()
+    mine = np.unique(net.origin[rings[0]])
+    points[mine, 1] *= 6.0
+    points = cell.surface.project(points)
+    after = Half(net.next, net.origin, points, np.zeros_like(foam.film_offsets))
+    whole = cell.surface.area
+    for bubble in (1, 2):
+        assert not _holds(cell.surface, after, np.array(loop), rings[bubble], 0.01 * whole)
+        assert _holds(cell.surface, after, np.array(loop), rings[bubble], 0.99 * whole)
+    inside = points.copy()
+    other = np.unique(net.origin[rings[1]])
+    inside[other] = cell.surface.project(spots[0] + 0.05 * (inside[other] - inside[other].mean(axis=0)))
+    after = Half(net.next, net.origin, inside, np.zeros_like(foam.film_offsets))
+    assert _holds(cell.surface, after, np.array(loop), rings[1], 0.01 * whole)
+    assert not _holds(cell.surface, after, np.array(loop), rings[1], 0.99 * whole)
+    assert not _holds(cell.surface, after, np.array(loop), rings[1][:0], 0.5 * whole)
