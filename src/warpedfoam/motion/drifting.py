@@ -16,6 +16,7 @@ from warpedfoam.io.atomic import PathLike, writable_path
 from warpedfoam.io.trajectory import SUFFIXES, Trajectory, TrajectoryWriter
 from warpedfoam.motion.changes import CHANGES, chords, cutoffs
 from warpedfoam.motion.drag import FrictionLaw
+from warpedfoam.motion.endings import MET, RIM, TOO_SHORT, VANISHED
 from warpedfoam.motion.frames import new_trajectory
 from warpedfoam.motion.markers import spaced
 from warpedfoam.motion.meeting import at_rim, crosses, marked
@@ -42,13 +43,6 @@ NOTHING = 1e-3
 MOST_CHANGES = 20
 
 Progress = Callable[[str, float], None]
-TOO_SHORT = (
-    "stopped: steps became too short at time {time:.6g} ({fault}); a film is about to vanish that may not "
-    "turn: one that ends in a marker, or of a bubble with three sides"
-)
-MET = "stopped: outlines have met at time {time:.6g}, and {fault}"
-RIM = "stopped at time {time:.6g}: {fault}"
-VANISHED = "stopped: bubble {name} has all but vanished at time {time:.6g}"
 
 
 @dataclass(eq=False)
