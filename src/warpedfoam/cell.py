@@ -15,6 +15,10 @@ from warpedfoam.surfaces.level_twins import without_twin
 from warpedfoam.surfaces.protocol import SIZES, Layer, Surface
 
 
+#: Widest gap between parallel plates, in sizes of the surface.
+WIDEST = 100.0
+
+
 @dataclass(frozen=True)
 class HeleShawCell:
     """The space between a surface and an outer plate at height ``gap`` along its normals.
@@ -43,8 +47,9 @@ class HeleShawCell:
     TypeError
         If ``surface`` is not a surface or ``gap`` neither a number nor a function.
     ValueError
-        If ``gap`` is not above 0, the plates would fold, or a gap that varies is not smooth, does not repeat
-        where the surface does, or has derivatives that are not its own.
+        If ``gap`` is not above 0 or more than 100 times the surface's size, the plates would fold, or a gap
+        that varies is not smooth, does not repeat where the surface does, or has derivatives that are not
+        its own.
 
     Examples
     --------
@@ -76,6 +81,11 @@ class HeleShawCell:
             self.__dict__["_fitted"] = found
             return
         number = as_number(found, "gap", positive=True, maximum=SIZES["maximum"])
+        if number > WIDEST * surface.size:
+            raise ValueError(
+                f"gap {number:g} is more than {WIDEST:g} times the surface's size ({surface.size:g}): plates so "
+                "far apart are no Hele-Shaw cell"
+            )
         least, _ = surface.curvature_range()
         # plates that touch to round-off have folded: 1 + 49 · (−1/49) need not be 0
         if not 1.0 + number * least > 1e-12:

@@ -23,6 +23,8 @@ from warpedfoam.relax.system import Linearised, State, Step, System
 
 #: Largest force left on a vertex or node after a step, in γ d, and largest relative error of a volume.
 FORCE, VOLUME = 1e-10, 3e-12
+#: Round-off of positions, relative to the surface's size: in very short steps friction makes it a force.
+ROUND_OFF = 1e-14
 #: Newton steps of an Euler step, and with yield friction; the largest in bubble sizes, and the largest
 #: change of a chord in chords.
 NEWTON, STICKING, REACH, TURN = 14, 60, 0.3, 0.5
@@ -224,6 +226,8 @@ class Stepper:
 
     def _newton(self, state: State, drag: Drag) -> State:
         convex, last = True, np.inf
+        stiff = self.time_scale / drag.time * self.foam.cell.surface.size / self.system.length
+        enough = max(FORCE, ROUND_OFF * stiff)
         for k in range(STICKING if self.law.yielding else PATIENT):
             lin = self._linearised(state, drag)
             now = lin.residuals
@@ -234,7 +238,7 @@ class Stepper:
                 raise StepFailed("a film has degenerated")
             if lin.slip > self.foam.cell.surface.precision:
                 raise StepFailed("the volumes do not add up")
-            if now.force <= FORCE and now.volume_error <= VOLUME:
+            if now.force <= enough and now.volume_error <= VOLUME:
                 # on the way there the matrix may be anything
                 if not convex:
                     raise StepFailed("the step's problem is not convex")

@@ -128,10 +128,18 @@ class TriangleMesh:
 
     @cached_property
     def rim_loops(self) -> tuple[Ints, ...]:
-        """Nodes along each loop of the rim, the surface on the left, once `require_surface` has passed."""
+        """Nodes along each loop of the rim, the surface on the left.
+
+        Raises
+        ------
+        MeshError
+            If a node lies on more than one of them.
+        """
         start, end = self.rim_edges.T
         if not len(start):
             return ()
+        if len(np.unique(start)) < len(start) or not np.array_equal(np.sort(start), np.sort(end)):
+            raise MeshError("rims touch each other at a node: no loop can be told from another")
         place = np.full(self.n_nodes, -1)
         place[start] = np.arange(len(start))
         loops = loops_of(place[end], np.zeros(len(start), dtype=np.int64))
