@@ -138,7 +138,9 @@ def test_motions_are_held_back(name: str, count: int) -> None:
 
 
 @live
-@pytest.mark.parametrize("name", ["hills", "sheet", "bowl", "saddle", "vase", "egg"])
+@pytest.mark.parametrize(
+    "name", ["hills", "sheet", "bowl", "saddle", "vase", pytest.param("egg", marks=pytest.mark.slow)]
+)
 def test_the_evolver_agrees_on_formulas(tmp_path: Path, name: str) -> None:
     """Periods, rims round rectangles, disks and turned bodies, symmetries; closed ones are soft on chords."""
     ours = relaxed(name)

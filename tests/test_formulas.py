@@ -97,7 +97,7 @@ def test_a_formula_gives_the_surface_of_the_functions() -> None:
     np.testing.assert_allclose(egg().principal_curvatures(x), twin.principal_curvatures(x), rtol=1e-10)
 
 
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("name", ["ring", "joined hills", "round hill", "vase"])
 def test_a_foam_on_it_comes_back_bit_for_bit(tmp_path: Path, name: str) -> None:
     cell = wf.HeleShawCell(SURFACES[name](), 0.1)
     foam = wf.voronoi_foam(cell, 30, seeds="blue", n_nodes=2000)
