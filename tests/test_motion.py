@@ -415,3 +415,12 @@ def test_a_fixed_step_that_is_too_long_is_shortened() -> None:
     assert moved.n_rejected > 0
     assert moved.n_steps > 1
     assert (np.diff(moved.step_energies) < 0.0).all()
+
+
+def test_the_shortest_steps_end_at_round_off() -> None:
+    """Friction makes round-off of positions a force in steps of 1e-7 of the time scale."""
+    cell = wf.HeleShawCell(wf.Sphere(10.0), 0.5)
+    rest = wf.relax(wf.voronoi_foam(cell, 20, seeds="lattice")).foam
+    moved = wf.drift(rest, duration=2e-4, every=4e-6)
+    assert moved.completed, moved.message
+    assert np.abs(moved.foam.vertex_points - rest.vertex_points).max() < 1e-9

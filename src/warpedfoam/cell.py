@@ -14,7 +14,6 @@ from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.level_twins import without_twin
 from warpedfoam.surfaces.protocol import SIZES, Layer, Surface
 
-
 #: Widest gap between parallel plates, in sizes of the surface.
 WIDEST = 100.0
 
@@ -81,17 +80,17 @@ class HeleShawCell:
             self.__dict__["_fitted"] = found
             return
         number = as_number(found, "gap", positive=True, maximum=SIZES["maximum"])
-        if number > WIDEST * surface.size:
-            raise ValueError(
-                f"gap {number:g} is more than {WIDEST:g} times the surface's size ({surface.size:g}): plates so "
-                "far apart are no Hele-Shaw cell"
-            )
         least, _ = surface.curvature_range()
         # plates that touch to round-off have folded: 1 + 49 · (−1/49) need not be 0
         if not 1.0 + number * least > 1e-12:
             raise ValueError(
                 f"gap {number:g} folds the outer plate: it must be less than {-1.0 / least:g}, "
                 "the least radius of curvature on the side of the gap"
+            )
+        if number > WIDEST * surface.size:
+            raise ValueError(
+                f"gap {number:g} is more than {WIDEST:g} times the surface's size ({surface.size:g}): plates "
+                "so far apart are no Hele-Shaw cell"
             )
         put(self, "surface", without_twin(surface))
         put(self, "gap", number)
