@@ -275,3 +275,9 @@ class TestRefusals:
             replace(foam, exterior=3)
         with pytest.raises(ValueError, match="must have an exterior"):
             wf.cluster_clearance(wf.voronoi_foam(SPHERE, 20, seed=0))
+
+
+def test_bubbles_too_small_for_their_digits_are_refused() -> None:
+    """A gap of 1e6 on a sphere of 10 leaves a volume of a half next to no area."""
+    with pytest.raises(ValueError, match="too few digits; take larger volumes, or a smaller gap"):
+        wf.cluster_foam(wf.HeleShawCell(wf.Sphere(10.0), 1e6), 7, volumes=0.5)

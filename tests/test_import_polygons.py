@@ -157,7 +157,7 @@ class TestRefuses:
             with pytest.raises(wf.FileFormatError, match=words):
                 wf.import_polygons(tmp_path / name, self.foam.cell)
         (tmp_path / "f.stl").write_text("")
-        with pytest.raises(ValueError, match=r"\.ply or \.obj"):
+        with pytest.raises(ValueError, match=r"\.ply, \.obj, \.fe or \.dmp"):
             wf.import_polygons(tmp_path / "f.stl", self.foam.cell)
         with pytest.raises(FileNotFoundError):
             wf.import_polygons(tmp_path / "none.ply", self.foam.cell)

@@ -86,8 +86,8 @@ def test_the_site_has_every_public_name(site: Path) -> None:
     }
     # plot_foam_3d opens a window; the others are what larger things hold, or what a surface must have
     assert bare <= {
-        "plot_foam_3d", "AnnealingHistory", "DriftEvent", "PartitionTry", "RelaxationHistory", "T1Event",
-        "GapField", "LevelSurface", "Surface", "LayeredRelaxation",
+        "plot_foam_3d", "AnnealingHistory", "CoarseningEvent", "DriftEvent", "PartitionTry",
+        "RelaxationHistory", "T1Event", "GapField", "LevelSurface", "Surface", "LayeredRelaxation",
     }  # fmt: skip
     # and docstrings are rendered, not just named: a method, a parameter
     assert "warpedfoam.Foam.film_curves" in anchors

@@ -14,9 +14,6 @@ from warpedfoam.surfaces.level import LevelSurface
 from warpedfoam.surfaces.level_twins import without_twin
 from warpedfoam.surfaces.protocol import SIZES, Layer, Surface
 
-#: Widest gap between parallel plates, in sizes of the surface.
-WIDEST = 100.0
-
 
 @dataclass(frozen=True)
 class HeleShawCell:
@@ -46,9 +43,8 @@ class HeleShawCell:
     TypeError
         If ``surface`` is not a surface or ``gap`` neither a number nor a function.
     ValueError
-        If ``gap`` is not above 0 or more than 100 times the surface's size, the plates would fold, or a gap
-        that varies is not smooth, does not repeat where the surface does, or has derivatives that are not
-        its own.
+        If ``gap`` is not above 0, the plates would fold, or a gap that varies is not smooth, does not repeat
+        where the surface does, or has derivatives that are not its own.
 
     Examples
     --------
@@ -86,11 +82,6 @@ class HeleShawCell:
             raise ValueError(
                 f"gap {number:g} folds the outer plate: it must be less than {-1.0 / least:g}, "
                 "the least radius of curvature on the side of the gap"
-            )
-        if number > WIDEST * surface.size:
-            raise ValueError(
-                f"gap {number:g} is more than {WIDEST:g} times the surface's size ({surface.size:g}): plates "
-                "so far apart are no Hele-Shaw cell"
             )
         put(self, "surface", without_twin(surface))
         put(self, "gap", number)

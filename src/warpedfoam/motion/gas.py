@@ -60,7 +60,27 @@ def gas_flow(foam: Foam, *, permeability: float = 1.0) -> Floats:
 
 
 def gas_dissipation(foam: Foam, *, permeability: float = 1.0) -> float:
-    """κ Σ (p_i − p_j)² A_ij, the energy that a relaxed foam loses per time; see `gas_flow`."""
+    """Energy that a relaxed foam loses per time by the flow of gas, κ Σ (p_i − p_j)² A_ij.
+
+    Parameters
+    ----------
+    foam : Foam
+        Relaxed, with its pressures.
+    permeability : float, optional
+        κ; see `gas_flow`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As in `gas_flow`.
+
+    Examples
+    --------
+    >>> from warpedfoam import HeleShawCell, Sphere, relax, voronoi_foam
+    >>> foam = relax(voronoi_foam(HeleShawCell(Sphere(1.0), gap=0.01), 40, seed=1)).foam
+    >>> gas_dissipation(foam, permeability=2.0) > gas_dissipation(foam) > 0.0
+    True
+    """
     flow = gas_flow(foam, permeability=permeability)
     assert foam.pressures is not None
     return -float(flow @ foam.pressures)

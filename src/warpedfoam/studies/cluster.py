@@ -31,6 +31,8 @@ MARCH = 32
 #: Parts of clusters farther apart than the second along the surface may not come nearer than the first in
 #: space, in spacings of bubbles.
 TOUCH, APART = 0.5, 1.2
+#: Smallest bubbles, in sizes of the surface: sixteen digits of a place leave ten of a film.
+LEAST = 1e-6
 #: Points along each film where clearances are measured.
 SAMPLES = 9
 
@@ -126,6 +128,11 @@ def cluster_foam(
 
     shares = np.split(held, np.cumsum(counts)[:-1])
     units = [np.sqrt(_area_for(cell, q, share.mean())) for q, share in zip(middles, shares, strict=True)]
+    if not min(units) >= LEAST * surface.size:
+        raise ValueError(
+            f"volumes make bubbles of size {min(units):.3g} on a surface of size {surface.size:.3g}: below "
+            f"{LEAST:g} of that their films have too few digits; take larger volumes, or a smaller gap"
+        )
     placed = [
         geodesic_chart(surface, q, unit * plan.points, angle)
         for plan, q, unit, angle in zip(layouts, middles, units, angles, strict=True)
@@ -146,8 +153,8 @@ def cluster_foam(
 def cluster_clearance(foam: Foam) -> float:
     """Least distance in space between outer films of bubbles that are no neighbours, in bubble sizes.
 
-    A small one tells that clusters, or a cluster and itself round a thin surface, are about to meet:
-    `warpedfoam.relax` does not see films that cross. Infinite if all outer bubbles are neighbours.
+    A small one tells that clusters, or a cluster and itself round a thin surface, are about to meet, which
+    `warpedfoam.relax` does not see if ``contacts=False``. Infinite if all outer bubbles are neighbours.
 
     Raises
     ------
