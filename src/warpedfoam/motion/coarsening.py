@@ -26,6 +26,8 @@ FIRST, LEAST, FRAME = 1e-3, 1e-9, 0.2
 SAFETY, SHRINK, GROW, FAILED = 0.9, 0.2, 1.5, 0.5
 #: Bubbles are followed down to half of the volume at which they vanish.
 BELOW = 0.5
+#: Flow, in mean volumes per mean area / κγ, that is none: a foam in balance would never have fewer bubbles.
+STILL = 1e-9
 #: Steps of a relaxation; after a T2 it has farther to go.
 STEPS, STEPS_AFTER = 200, 1000
 
@@ -47,6 +49,7 @@ class _Run:
     """The moving parts of a coarsening."""
 
     options: _Options
+    unit: float
     foam: Foam
     rate: Floats
     time: float = 0.0
@@ -96,13 +99,14 @@ def coarsen(
     Parameters
     ----------
     foam : Foam
-        Relaxed first.
+        Relaxed first; what is smaller than ``vanish`` goes before the first frame.
     permeability : float, optional
         κ, volume per time, film area and pressure.
     duration : float, optional
         Time to cover. Mean area / κγ is the time in which bubbles come and go.
     until : int, optional
         End when no more bubbles than this are left, an exterior not counted. Give this, a duration, or both.
+        Without a duration a foam in balance, where no gas flows, ends the run too.
     every : float, optional
         Time between frames; by default a fiftieth of the duration, or a fifth of the first mean area / κγ.
     tolerance : float, optional
@@ -192,8 +196,9 @@ def _begun(foam: Foam, options: _Options, unit: float) -> _Run:
     if not found.converged:
         raise ValueError(f"foam does not relax, so that its pressures are unknown: {found.message}")
     start = found.foam
-    run = _Run(options, start, gas_flow(start, permeability=options.permeability))
+    run = _Run(options, unit, start, gas_flow(start, permeability=options.permeability))
     run.step = options.step or FIRST * unit
+    _let_vanish(run)
     _log(run, 0.0)
     _keep_frame(run)
     return run
@@ -260,6 +265,9 @@ def _coarsened(
     end = np.inf if duration is None else duration
     first = run.log[0][2]
     while run.time < end and len(run.held) > until and not run.fault:
+        if end == np.inf and np.abs(run.rate).max() * run.unit < STILL * run.held.mean():
+            run.fault = f"stopped: no gas flows at time {run.time:.6g}, the foam is in balance"
+            break
         # frames are counted, not added up
         number = int(np.floor(run.time / run.options.every * (1.0 + 1e-12))) + 1
         target = min(number * run.options.every, end)
@@ -296,24 +304,27 @@ def _coarsened(
 def _step(run: _Run, target: float) -> None:
     """One step that is kept, at most to ``target``; shorter and shorter ones are tried."""
     options, foam = run.options, run.foam
-    held, flow = run.held, _held(foam, run.rate)
-    mean = float(held.mean())
-    least = LEAST * mean / max(float(np.abs(flow).max()), 1e-300)
+    mean = float(run.held.mean())
+    # a foam in balance has no flow to measure time by
+    least = LEAST * min(mean / max(float(np.abs(run.rate).max()), 1e-300), run.unit)
     small = BELOW * options.vanish * mean
-    shrinking = flow < 0.0
-    room = float(((held - small)[shrinking] / -flow[shrinking]).min(initial=np.inf))
-    left, fault = target - run.time, ""
+    shrinking = run.rate < 0.0
+    room = float(((foam.target_volumes - small)[shrinking] / -run.rate[shrinking]).min(initial=np.inf))
+    left, fault, rejected = target - run.time, "", run.rejected
     wanted = run.step if options.step is None else options.step
     while True:
         time = min(wanted, room, left)
-        if time < least:
+        if left - time < least and run.rejected == rejected:
+            # what would be left is no step, nor is it a failure if the whole way is none
+            time = left
+        elif time < least:
             run.fault = f"stopped: steps became too short at time {run.time:.6g} ({fault or 'tolerance'})"
             return
         speed = run.rate
         if run.past is not None:
             speed = speed + 0.5 * time / run.past[0] * (run.rate - run.past[1])
         targets = foam.target_volumes + time * speed
-        if not _held(foam, targets).min() > 0.5 * small:
+        if not targets.min() > 0.5 * small:
             wanted, fault = FAILED * time, "a bubble vanishes too fast"
             run.rejected += 1
             continue
@@ -364,8 +375,8 @@ def _booked(run: _Run, found: Relaxation) -> bool:
 
 
 def _let_vanish(run: _Run) -> None:
-    """T2s on all bubbles that are too small, smallest first."""
-    foam = run.foam
+    """T2s on all bubbles that are too small, smallest first; all of them are kept or none."""
+    foam, gone = run.foam, list[CoarseningEvent]()
     while True:
         held = foam.target_volumes.copy()
         mean = float(_held(foam, held).mean())
@@ -374,6 +385,9 @@ def _let_vanish(run: _Run) -> None:
         bubble = int(held.argmin())
         if held[bubble] >= run.options.vanish * mean:
             break
+        if foam.n_bubbles == 2:
+            run.fault = f"stopped: the last bubble but one is about to vanish at time {run.time:.6g}"
+            return
         x, y, z = foam.bubble_centres[bubble].tolist()
         name = int(foam.bubble_ids[bubble])
         try:
@@ -381,13 +395,17 @@ def _let_vanish(run: _Run) -> None:
         except TopologyError as fault:
             run.fault = f"stopped: bubble {name} is about to vanish at time {run.time:.6g}, but {fault}"
             return
-        run.events.append(CoarseningEvent(run.time, run.count, "t2", (name,), (), (x, y, z)))
+        gone.append(CoarseningEvent(run.time, run.count, "t2", (name,), (), (x, y, z)))
+    if foam.exterior is not None and foam.target_volumes[foam.exterior] < run.options.vanish * mean:
+        run.fault = f"stopped: the cluster has left no room for its exterior at time {run.time:.6g}"
+        return
     if foam is run.foam:
         return
     found = _relaxed(foam, foam.target_volumes, STEPS_AFTER)
     if not found.converged:
         run.fault = f"stopped: the foam did not relax after a T2 at time {run.time:.6g}: {found.message}"
         return
+    run.events += gone
     _booked(run, found)
     run.past = None
     run.foam = found.foam
