@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 import warpedfoam as wf
 
@@ -302,6 +301,8 @@ def number(text):
 
 
 def check_numbers(browser, foam, bubble):
+    import pytest  # what else takes the browser from here does without
+
     caption, rows = numbers(browser)
     assert caption == f"Bubble {foam.bubble_ids[bubble]}"
     assert number(rows["sides"]) == foam.network.sides[bubble]

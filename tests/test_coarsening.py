@@ -344,6 +344,9 @@ def test_a_cluster_that_fills_the_sphere_ends_the_run() -> None:
     assert not made.completed
     assert "no room for its exterior" in made.message
     assert made.foam.bubble_volumes[1] > 0.0
+    areas = [frame.bubble_areas[0] for frame in made.foams]
+    steps = np.searchsorted(made.step_times, made.times)
+    np.testing.assert_allclose(made.step_mean_areas[steps], areas, rtol=1e-12)
     full = np.log(2.0 * np.pi / (0.7 * 4.0 * np.pi - 2.0 * np.pi))
     assert made.times[-1] == pytest.approx(full, rel=0.1)
 
@@ -372,6 +375,21 @@ def test_any_bubble_at_a_wall_may_vanish() -> None:
         fewer = wf.t2(foam, int(bubble))
         assert fewer.network.charges.sum() == 0
         assert fewer.target_volumes.sum() == pytest.approx(foam.cell.volume, rel=1e-12)
+
+
+def test_going_on_needs_the_same_run_but_not_the_same_end(tmp_path: Path) -> None:
+    foam, path = relaxed("sphere", 12), tmp_path / "run.h5"
+    first = wf.coarsen(foam, duration=0.01, trajectory=path)
+    longer = wf.coarsen(foam, duration=0.0104, trajectory=path, resume=True)
+    assert longer.completed
+    assert longer.times[:-2].tolist() == first.times.tolist()
+    np.testing.assert_allclose(longer.times[-2:], [0.0102, 0.0104], rtol=1e-12)
+    with pytest.raises(ValueError, match="another foam"):
+        wf.coarsen(replace(foam, tension=2.0, pressures=None), duration=0.02, trajectory=path, resume=True)
+    drifted = tmp_path / "drift.h5"
+    wf.drift(foam, duration=1e-4, every=1e-4, trajectory=drifted)
+    with pytest.raises(ValueError, match="holds no coarsening"):
+        wf.coarsen(foam, duration=0.01, trajectory=drifted, resume=True)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ class _Run:
     past: tuple[float, Floats] | None = None
     foams: list[Foam] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
-    log: list[tuple[float, float, int, float, float]] = field(default_factory=list)
+    log: list[tuple[float, float, int, float, float, float]] = field(default_factory=list)
     events: list[CoarseningEvent] = field(default_factory=list)
     noted: tuple[int, int] = (0, 0)
     fault: str = ""
@@ -121,7 +121,8 @@ def coarsen(
         HDF5 file (``.h5``) that takes each frame when it is reached; needs h5py.
     resume : bool, optional
         Go on with the frames in ``trajectory``, if there are any: the same foam and options are needed, but
-        for duration and until. A run that was killed and resumed makes the same frames bit for bit.
+        for duration and until; ``every`` is the file's if it is left out. A run that was killed and resumed
+        makes the same frames bit for bit.
     progress : callable, optional
         Called as ``progress("coarsen", fraction)`` after each step.
 
@@ -180,7 +181,7 @@ def coarsen(
     if path is None:
         return _coarsened(run, span, few, None, report)
     if going_on and path.exists():
-        _recall(run, path)
+        _recall(run, path, usual=every is None)
     else:
         new_trajectory(path, lambda writer: _write_frame(run, writer, {"options": asdict(options)}))
     with TrajectoryWriter(path, append=True) as writer:
@@ -206,7 +207,11 @@ def _begun(foam: Foam, options: _Options, unit: float) -> _Run:
 
 def _log(run: _Run, error: float) -> None:
     sides = _held(run.foam, run.foam.network.sides.astype(np.float64))
-    run.log.append((run.time, run.foam.energy, len(sides), float(sides.var()), error))
+    surface = run.foam.cell.surface
+    area = surface.area / len(sides)
+    if run.foam.exterior is not None:
+        area = float(_held(run.foam, run.foam.bubble_areas).mean())
+    run.log.append((run.time, run.foam.energy, len(sides), float(sides.var()), error, area))
 
 
 def _keep_frame(run: _Run) -> None:
@@ -230,27 +235,30 @@ def _write_frame(run: _Run, writer: TrajectoryWriter, more: dict[str, Any]) -> N
     writer.append(run.foams[-1], time=run.times[-1], notes={"coarsening": notes})
 
 
-def _recall(run: _Run, path: Path) -> None:
-    """Take up the run in a trajectory, if it is this one."""
+def _recall(run: _Run, path: Path, *, usual: bool) -> None:
+    """Take up the run in a trajectory, if it is this one; as ``usual`` with its time between frames."""
     with Trajectory(path) as frames:
         notes = [frames.notes(k).get("coarsening") for k in range(len(frames))]
         if not notes or not all(isinstance(note, dict) for note in notes):
             raise ValueError(f"{path} holds no coarsening; use another file")
         foams, times = list(frames), frames.times.tolist()
     kept = [dict(note) for note in notes if note is not None]
-    mine, theirs = asdict(run.options), kept[0]["options"]
+    theirs = kept[0]["options"]
+    if usual:
+        run.options = replace(run.options, every=theirs["every"])
+    mine = asdict(run.options)
     other = [name for name in mine if mine[name] != theirs.get(name)]
     if other:
         raise ValueError(f"{path} holds a coarsening with another {', '.join(other)}; use another file")
     same = all(
         np.array_equal(getattr(run.foam, name), getattr(foams[0], name))
-        for name in ("vertex_points", "film_offsets", "target_volumes")
+        for name in ("vertex_points", "film_offsets", "target_volumes", "bubble_ids", "tension")
     )
     if not same or foams[0].cell != run.foam.cell:
         raise ValueError(f"{path} holds the coarsening of another foam; use another file")
     run.foams, run.times, run.log, run.events = foams, times, [], []
     for note in kept:
-        run.log += [(row[0], row[1], row[2], row[3], row[4]) for row in note["log"]]
+        run.log += [(row[0], row[1], row[2], row[3], row[4], row[5]) for row in note["log"]]
         run.events += [CoarseningEvent.from_record(entry) for entry in note["events"]]
     last = kept[-1]
     run.foam, run.time, run.step = foams[-1], times[-1], last["step"]
@@ -295,6 +303,7 @@ def _coarsened(
         step_bubbles=frozen(np.array(columns[2], dtype=np.int64)),
         step_mu2=frozen(np.array(columns[3], dtype=np.float64)),
         step_errors=frozen(np.array(columns[4], dtype=np.float64)),
+        step_mean_areas=frozen(np.array(columns[5], dtype=np.float64)),
         n_rejected=run.rejected,
         completed=not run.fault,
         message=run.fault or ended,
