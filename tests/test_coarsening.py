@@ -351,6 +351,19 @@ def test_a_cluster_that_fills_the_sphere_ends_the_run() -> None:
     assert made.times[-1] == pytest.approx(full, rel=0.1)
 
 
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_cluster_that_loses_its_gas_ends_the_run(n: int) -> None:
+    """One bubble or two alike: none is ever small beside the mean."""
+    cell = wf.HeleShawCell(wf.Sphere(1.0), 0.01)
+    made = wf.coarsen(wf.cluster_foam(cell, n, volumes=0.001), duration=5.0, every=1.0)
+    assert not made.completed
+    assert "given away its gas" in made.message
+    assert made.foam.bubble_areas[:n].sum() < 0.003 * made.foams[0].bubble_areas[:n].sum()
+    if n == 1:
+        area = made.foams[0].bubble_areas[0]
+        assert made.times[-1] == pytest.approx(-np.log(1.0 - area / (2.0 * np.pi)), rel=0.01)
+
+
 def test_bubbles_that_cannot_go_are_not_told_as_gone() -> None:
     """Two triangles vanish at once and leave half turns, which films without markers cannot be."""
     made = wf.coarsen(wf.relax(_prism()).foam, until=1)

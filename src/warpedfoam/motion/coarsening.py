@@ -91,6 +91,9 @@ def coarsen(
     volumes follow `gas_flow`, dV_i/dt = −κ Σ (p_i − p_j) A_ij. A bubble below ``vanish`` mean volumes goes
     (T2): its films meet, its gas is its neighbours'.
 
+    An open cluster loses gas to its exterior, or takes all of it: the run ends where ``vanish`` of the one or
+    the other is left.
+
     Volumes are stepped by Adams and Bashforth's second-order formula (Euler's after a change of topology),
     and the difference from the trapezoidal rule sets the step. Since rates hardly change but when films turn
     (by von Neumann's law not at all on flat plates), it is T1s within a step that make the error: it is of
@@ -319,6 +322,10 @@ def _step(run: _Run, target: float) -> None:
     small = BELOW * options.vanish * mean
     shrinking = run.rate < 0.0
     room = float(((foam.target_volumes - small)[shrinking] / -run.rate[shrinking]).min(initial=np.inf))
+    lost = -float(_held(foam, run.rate).sum())
+    if foam.exterior is not None and lost > 0.0:
+        # a cluster shrinks as a whole, by half at most: its films have as far to go
+        room = min(room, 0.5 * float(run.held.sum()) / lost)
     left, fault, rejected = target - run.time, "", run.rejected
     wanted = run.step if options.step is None else options.step
     while True:
@@ -386,6 +393,11 @@ def _booked(run: _Run, found: Relaxation) -> bool:
 def _let_vanish(run: _Run) -> None:
     """T2s on all bubbles that are too small, smallest first; all of them are kept or none."""
     foam, gone = run.foam, list[CoarseningEvent]()
+    start = run.foams[0] if run.foams else foam
+    if run.held.sum() < run.options.vanish * _held(start, start.target_volumes).sum():
+        # mean volumes shrink with a cluster: none of its bubbles need ever be small beside them
+        run.fault = f"stopped: the cluster has given away its gas at time {run.time:.6g}"
+        return
     while True:
         held = foam.target_volumes.copy()
         mean = float(_held(foam, held).mean())
