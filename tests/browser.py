@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+import warpedfoam as wf
+
 NAMES = (
     "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome", "google-chrome-stable",
     "chrome", "microsoft-edge",
@@ -249,3 +251,66 @@ class Browser:
             path.write_bytes(raw)
         pixels = np.round(255.0 * imread(io.BytesIO(raw), format="png")[..., :3])
         return pixels.astype(np.uint8)
+
+
+# ------------------------------------------------------------------ what tests of the viewer share
+
+WHITE = np.array([255, 255, 255])
+ACCENT = np.array([0xD4, 0x00, 0x9F])
+CANVAS = "document.getElementById('scene').getBoundingClientRect().toJSON()"
+
+
+def shown(browser, path, *args, **kwargs):
+    browser.open(wf.write_view(path / "view.html", *args, **kwargs))
+
+
+def scene(browser):
+    """Pixels of the canvas."""
+    box = browser.ask(CANVAS)
+    pixels = browser.screenshot()
+    scale = pixels.shape[1] / browser.ask("innerWidth")
+    x, y, w, h = (round(scale * box[k]) for k in ("x", "y", "width", "height"))
+    return pixels[y : y + h, x : x + w].astype(int)
+
+
+def front(foam, towards):
+    """Bubbles whose centres face the eye most, foremost first."""
+    normals = foam.cell.surface.normals(foam.bubble_centres)
+    return np.argsort(-(normals @ np.asarray(towards)))
+
+
+def axis(elevation, azimuth):
+    e, a = np.radians([elevation, azimuth])
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
+def where(browser, point):
+    return tuple(browser.ask(f"foamViewer.where({list(map(float, point))})"))
+
+
+def numbers(browser):
+    """The table of the picked bubble: caption, and rows by name."""
+    code = """[document.querySelector('#numbers caption')?.textContent ?? null,
+      Object.fromEntries(
+        [...document.querySelectorAll('#numbers td')].map((c) => [c.dataset.name, c.textContent]))]"""
+    return browser.ask(code)
+
+
+def number(text):
+    return float(text.replace("−", "-"))
+
+
+def check_numbers(browser, foam, bubble):
+    import pytest  # what else takes the browser from here does without
+
+    caption, rows = numbers(browser)
+    assert caption == f"Bubble {foam.bubble_ids[bubble]}"
+    assert number(rows["sides"]) == foam.network.sides[bubble]
+    assert number(rows["charge"]) == foam.network.charges[bubble]
+    assert number(rows["area"]) == pytest.approx(foam.bubble_areas[bubble], rel=1e-5)
+    assert number(rows["volume"]) == pytest.approx(foam.bubble_volumes[bubble], rel=1e-5)
+    assert number(rows["target volume"]) == pytest.approx(foam.target_volumes[bubble], rel=1e-5)
+    if foam.pressures is not None:
+        assert number(rows["pressure"]) == pytest.approx(foam.pressures[bubble], rel=1e-4)
+    mean = foam.bubble_curvatures[bubble] / foam.bubble_areas[bubble]
+    assert number(rows["mean Gaussian curvature"]) == pytest.approx(mean, rel=1e-4)

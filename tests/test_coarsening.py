@@ -25,7 +25,7 @@ def relaxed(kind: str, n: int = 40, seed: int = 3, gap: float = 0.01, seeds: str
 
 
 @cache
-def run(n: int = 40, until: int = 20) -> wf.Coarsening:
+def run(n: int = 40, until: int = 24) -> wf.Coarsening:
     return wf.coarsen(relaxed("sphere", n), until=until)
 
 
@@ -55,10 +55,7 @@ def test_von_neumanns_law_on_a_torus() -> None:
 
 def test_regular_foams_on_a_sphere_stay_as_they_are() -> None:
     """Areas (6 − n)π/3: four triangles, six squares, twelve pentagons."""
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-    loops = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    cube = wf.relax(wf.Foam.from_loops(wf.HeleShawCell(wf.Sphere(1.0), 0.1), corners, loops)).foam
-    assert np.abs(wf.gas_flow(cube)).max() < 1e-9
+    assert np.abs(wf.gas_flow(_cube())).max() < 1e-9
 
 
 def test_energy_goes_as_gas_flows() -> None:
@@ -94,8 +91,8 @@ def test_a_lone_bubble_gives_its_gas_away_with_order_two() -> None:
 def test_a_run() -> None:
     made = run()
     assert made.completed, made.message
-    assert made.n_t2 == 20
-    assert made.step_bubbles[-1] == made.foam.n_bubbles == 20
+    assert made.n_t2 == 40 - made.foam.n_bubbles
+    assert made.step_bubbles[-1] == made.foam.n_bubbles <= 24
     assert made.n_t1 > 0
     assert (np.diff(made.step_energies) < 0.0).all()
     assert (np.diff(made.step_times) > 0.0).all()
@@ -139,24 +136,23 @@ def test_smaller_steps_change_less_and_less() -> None:
     """With T1s and T2s on the way: their times are of first order in the step."""
     foam = relaxed("sphere", 24, seed=5, seeds="random")
     found = [
-        wf.coarsen(foam, duration=0.8, every=0.8, tolerance=t, vanish=1e-3)
-        for t in (4e-2, 1e-2, 2.5e-3, 1e-4)
+        wf.coarsen(foam, duration=0.8, every=0.8, tolerance=t, vanish=1e-3) for t in (4e-2, 2.5e-3, 2e-4)
     ]
     assert {made.foam.n_bubbles for made in found} == {found[0].foam.n_bubbles}
     assert found[0].n_t2 > 0
     off = [np.abs(made.foam.bubble_areas - found[-1].foam.bubble_areas).max() for made in found[:-1]]
-    assert off[2] < 0.01
-    assert off[2] < 0.5 * off[0]
+    assert off[1] < 0.01
+    assert off[1] < 0.5 * off[0]
 
 
 @pytest.mark.parametrize("kind", ["sphere", "torus", "cylinder"])
 def test_any_bubble_may_vanish(kind: str) -> None:
     """Charges, Euler's number, names, volumes and equilibrium, whichever bubbles go."""
-    foam = relaxed(kind, 60)
+    foam = relaxed(kind, 40)
     chi = foam.cell.surface.euler_characteristic
     rng = np.random.default_rng(1)
     gone: list[int] = []
-    while len(gone) < 12:
+    while len(gone) < 8:
         bubble = int(rng.integers(foam.n_bubbles))
         if kind == "cylinder" and foam.network.wall_counts[bubble]:
             continue
@@ -272,13 +268,13 @@ class _Stop(Exception):
 
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
     foam, path = relaxed("sphere"), tmp_path / "run.h5"
-    options = {"every": 0.05, "until": 34}
+    options = {"every": 0.05, "until": 38}
     whole = wf.coarsen(foam, **options)
     seen = []
 
     def stop(_stage: str, _fraction: float) -> None:
         seen.append(_fraction)
-        if len(seen) == 20:
+        if len(seen) == 14:
             raise _Stop
 
     with pytest.raises(_Stop):
@@ -296,6 +292,117 @@ def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
         wf.coarsen(relaxed("sphere", seed=4), trajectory=path, resume=True, **options)
     with pytest.raises(FileExistsError, match="resume=True"):
         wf.coarsen(foam, trajectory=path, **options)
+
+
+def _cube() -> wf.Foam:
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    loops = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return wf.relax(wf.Foam.from_loops(wf.HeleShawCell(wf.Sphere(1.0), 0.1), corners, loops)).foam
+
+
+def test_a_foam_in_balance_stays() -> None:
+    """No flow to measure steps by: it lasts as long as asked, and one that waits for bubbles to go ends."""
+    made = wf.coarsen(_cube(), duration=1.0, every=0.5)
+    assert made.completed, made.message
+    assert made.times.tolist() == [0.0, 0.5, 1.0]
+    np.testing.assert_allclose(made.foam.bubble_areas, made.foams[0].bubble_areas, rtol=1e-8)
+    waiting = wf.coarsen(_cube(), until=3)
+    assert not waiting.completed
+    assert "in balance" in waiting.message
+
+
+@pytest.mark.parametrize("duration", [1e-13, 1e-7])
+def test_short_runs_get_to_their_end(duration: float) -> None:
+    made = wf.coarsen(relaxed("sphere", 12), duration=duration, every=10.0)
+    assert made.completed, made.message
+    assert made.times.tolist() == [0.0, duration]
+
+
+def test_more_bubbles_asked_for_than_there_are() -> None:
+    made = wf.coarsen(relaxed("sphere", 12), until=12)
+    assert made.completed
+    assert made.n_steps == 0
+    assert len(made.foams) == 1
+
+
+def test_what_is_too_small_at_the_start_goes_first() -> None:
+    foam = relaxed("sphere", 12)
+    volumes = foam.target_volumes.copy()
+    volumes[3] = 1e-3 * volumes.mean()
+    volumes *= foam.cell.volume / volumes.sum()
+    made = wf.coarsen(replace(foam, target_volumes=volumes), duration=0.01, every=0.01)
+    assert made.completed, made.message
+    assert [(event.kind, event.losers) for event in made.events if event.kind == "t2"] == [("t2", (3,))]
+    assert made.step_bubbles.tolist() == [11] * (made.n_steps + 1)
+    assert [frame.n_bubbles for frame in made.foams] == [11, 11]
+
+
+def test_a_cluster_that_fills_the_sphere_ends_the_run() -> None:
+    """Beyond half of the sphere a bubble grows, by A − 2π, until nothing is left outside."""
+    cell = wf.HeleShawCell(wf.Sphere(1.0), 0.01)
+    made = wf.coarsen(wf.cluster_foam(cell, 1, volumes=0.7 * cell.volume), duration=5.0, every=1.0)
+    assert not made.completed
+    assert "no room for its exterior" in made.message
+    assert made.foam.bubble_volumes[1] > 0.0
+    areas = [frame.bubble_areas[0] for frame in made.foams]
+    steps = np.searchsorted(made.step_times, made.times)
+    np.testing.assert_allclose(made.step_mean_areas[steps], areas, rtol=1e-12)
+    full = np.log(2.0 * np.pi / (0.7 * 4.0 * np.pi - 2.0 * np.pi))
+    assert made.times[-1] == pytest.approx(full, rel=0.1)
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_cluster_that_loses_its_gas_ends_the_run(n: int) -> None:
+    """One bubble or two alike: none is ever small beside the mean."""
+    cell = wf.HeleShawCell(wf.Sphere(1.0), 0.01)
+    made = wf.coarsen(wf.cluster_foam(cell, n, volumes=0.001), duration=5.0, every=1.0)
+    assert not made.completed
+    assert "given away its gas" in made.message
+    assert made.foam.bubble_areas[:n].sum() < 0.003 * made.foams[0].bubble_areas[:n].sum()
+    if n == 1:
+        area = made.foams[0].bubble_areas[0]
+        assert made.times[-1] == pytest.approx(-np.log(1.0 - area / (2.0 * np.pi)), rel=0.01)
+
+
+def test_bubbles_that_cannot_go_are_not_told_as_gone() -> None:
+    """Two triangles vanish at once and leave half turns, which films without markers cannot be."""
+    made = wf.coarsen(wf.relax(_prism()).foam, until=1)
+    assert not made.completed
+    assert made.n_t2 == made.foams[0].n_bubbles - made.foam.n_bubbles
+    assert made.step_bubbles[-1] == made.foam.n_bubbles
+
+
+def _prism() -> wf.Foam:
+    turn = np.radians([0.0, 120.0, 240.0])
+    ends = [np.stack([np.cos(turn), np.sin(turn), np.full(3, z)], axis=1) for z in (-1.0, 1.0)]
+    loops = [(2, 1, 0), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)]
+    shares = np.array([0.05, 0.05, 0.3, 0.3, 0.3])
+    cell = wf.HeleShawCell(wf.Sphere(1.0), 0.01)
+    return wf.Foam.from_loops(cell, np.vstack(ends), loops, target_volumes=shares * cell.volume)
+
+
+def test_any_bubble_at_a_wall_may_vanish() -> None:
+    """With long films too, which turn out over the rim at first."""
+    foam = relaxed("cylinder", 30, seed=2, seeds="random")
+    for bubble in np.flatnonzero(foam.network.wall_counts):
+        fewer = wf.t2(foam, int(bubble))
+        assert fewer.network.charges.sum() == 0
+        assert fewer.target_volumes.sum() == pytest.approx(foam.cell.volume, rel=1e-12)
+
+
+def test_going_on_needs_the_same_run_but_not_the_same_end(tmp_path: Path) -> None:
+    foam, path = relaxed("sphere", 12), tmp_path / "run.h5"
+    first = wf.coarsen(foam, duration=0.01, trajectory=path)
+    longer = wf.coarsen(foam, duration=0.0104, trajectory=path, resume=True)
+    assert longer.completed
+    assert longer.times[:-2].tolist() == first.times.tolist()
+    np.testing.assert_allclose(longer.times[-2:], [0.0102, 0.0104], rtol=1e-12)
+    with pytest.raises(ValueError, match="another foam"):
+        wf.coarsen(replace(foam, tension=2.0, pressures=None), duration=0.02, trajectory=path, resume=True)
+    drifted = tmp_path / "drift.h5"
+    wf.drift(foam, duration=1e-4, every=1e-4, trajectory=drifted)
+    with pytest.raises(ValueError, match="holds no coarsening"):
+        wf.coarsen(foam, duration=0.01, trajectory=drifted, resume=True)
 
 
 @pytest.mark.parametrize(

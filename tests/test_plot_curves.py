@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from warpedfoam import (
+    Cylinder,
     HeleShawCell,
     Relaxation,
     Sphere,
@@ -109,6 +110,32 @@ def test_equal_areas_have_no_slope_of_lewis() -> None:
     axes = plot_sides(foam_statistics(found)).axes[2]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["measured", "all areas equal"]
     assert axes.get_ylim() == (0.9, 1.1)
+
+
+def test_bubbles_at_walls_are_grey_bars() -> None:
+    """Their charge is 6 − films − 2 walls: the colour of their sides would be another charge's."""
+    foam = voronoi_foam(HeleShawCell(Cylinder(1.0, 3.0), gap=0.01), n_bubbles=30, seed=1)
+    found, walls = foam_statistics(foam), foam.network.wall_counts > 0
+    assert 0 < walls.sum() == found.at_walls.sum() < 30
+    bars = plot_sides(found).axes[0].patches
+    inner, outer = bars[: len(found.sides)], bars[len(found.sides) :]
+    for n, low, high in zip(found.sides, inner, outer, strict=True):
+        same = foam.network.sides == n
+        assert low.get_height() == pytest.approx((same & ~walls).sum() / 30)
+        assert high.get_height() == pytest.approx((same & walls).sum() / 30)
+        assert high.get_y() == pytest.approx(low.get_height())
+        assert np.ptp(high.get_facecolor()[:3]) < 1e-12
+    assert f"grey: {walls.sum()} at walls" in plot_sides(found).axes[0].get_title()
+    closed = plot_sides(foam_statistics(sphere_foam(60))).axes[0]
+    assert "grey" not in closed.get_title()
+    # Σ of all bubbles' neighbours' sides, every film seen from both of its sides, rim or not
+    network = foam.network
+    sums = np.bincount(network.left, network.sides[network.right], 30)
+    sums += np.bincount(network.right, network.sides[network.left], 30)
+    films = np.bincount(network.left, minlength=30) + np.bincount(network.right, minlength=30)
+    for k, n in enumerate(found.sides):
+        same = network.sides == n
+        assert found.neighbour_sides[k] == pytest.approx(sums[same].sum() / films[same].sum(), rel=1e-12)
 
 
 def test_an_exterior_is_grey_and_no_bubble() -> None:

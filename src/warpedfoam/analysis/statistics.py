@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpedfoam.analysis.correlations import as_foams
-from warpedfoam.arrays import Floats, Ints, frozen
+from warpedfoam.arrays import Bools, Floats, Ints, frozen
 from warpedfoam.foam import Foam
 
 
@@ -40,6 +40,9 @@ class FoamStatistics:
     pressure_deviation : float or None
         Standard deviation of the pressures.
     n_bubbles : int
+    at_walls : (k,) integer array
+        How many of the n-sided bubbles are at walls, where a wall counts as a side and the charge is not
+        6 − n.
     """
 
     sides: Ints
@@ -55,6 +58,7 @@ class FoamStatistics:
     area_deviation: float
     pressure_deviation: float | None
     n_bubbles: int
+    at_walls: Ints
 
 
 def foam_statistics(foams: Foam | Iterable[Foam]) -> FoamStatistics:
@@ -89,7 +93,7 @@ def foam_statistics(foams: Foam | Iterable[Foam]) -> FoamStatistics:
     members = as_foams(foams)
     parts = [_of_one(foam) for foam in members]
     n, area = (np.concatenate([p[k] for p in parts]) for k in (0, 1))
-    near, far = (np.concatenate([p[k] for p in parts]) for k in (3, 4))
+    near, far, walled = (np.concatenate([p[k] for p in parts]) for k in (3, 4, 5))
     pressure = (
         np.concatenate([p[2] for p in parts if p[2] is not None])
         if all(p[2] is not None for p in parts)
@@ -115,6 +119,7 @@ def foam_statistics(foams: Foam | Iterable[Foam]) -> FoamStatistics:
         float(area.std()),
         None if pressure is None else float(pressure.std()),
         len(n),
+        frozen(np.bincount(place, walled, len(sides)).astype(np.int64)),
     )
 
 
@@ -125,17 +130,17 @@ def _aboav(sides: Ints, counts: Ints, neighbour: Floats, mean: float, mu2: float
     return float(-(counts * x * y).sum() / (counts * x * x).sum())
 
 
-def _of_one(foam: Foam) -> tuple[Ints, Floats, Floats | None, Ints, Ints]:
-    """Sides, relative areas and pressures of the disks; sides of both bubbles along each film, both ways."""
+def _of_one(foam: Foam) -> tuple[Ints, Floats, Floats | None, Ints, Ints, Bools]:
+    """Of the disks sides, relative areas and pressures; sides on both sides of each film; who is at walls."""
     network = foam.network
     inside = network.bubble_euler == 1
     n, area = network.sides[inside], foam.bubble_areas[inside]
     pressure = None if foam.pressures is None else foam.pressures[inside]
-    # a film in several pieces counts once: by the piece that starts at a vertex, seen from either end
+    # a film in several pieces counts once from either end: by the piece that starts at no marker
     halves = np.flatnonzero(
         inside[network.bubble]
         & inside[network.bubble.reshape(-1, 2)[:, ::-1].ravel()]
-        & (network.vertex_degrees[network.origin] == 3)
+        & (network.vertex_degrees[network.origin] != 2)
     )
     near, far = network.sides[network.bubble[halves]], network.sides[network.bubble[halves ^ 1]]
-    return n, area / float(area.mean()), pressure, near, far
+    return n, area / float(area.mean()), pressure, near, far, network.wall_counts[inside] > 0

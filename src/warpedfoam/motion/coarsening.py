@@ -26,6 +26,8 @@ FIRST, LEAST, FRAME = 1e-3, 1e-9, 0.2
 SAFETY, SHRINK, GROW, FAILED = 0.9, 0.2, 1.5, 0.5
 #: Bubbles are followed down to half of the volume at which they vanish.
 BELOW = 0.5
+#: Flow, in mean volumes per mean area / κγ, that is none: a foam in balance would never have fewer bubbles.
+STILL = 1e-9
 #: Steps of a relaxation; after a T2 it has farther to go.
 STEPS, STEPS_AFTER = 200, 1000
 
@@ -47,6 +49,7 @@ class _Run:
     """The moving parts of a coarsening."""
 
     options: _Options
+    unit: float
     foam: Foam
     rate: Floats
     time: float = 0.0
@@ -56,7 +59,7 @@ class _Run:
     past: tuple[float, Floats] | None = None
     foams: list[Foam] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
-    log: list[tuple[float, float, int, float, float]] = field(default_factory=list)
+    log: list[tuple[float, float, int, float, float, float]] = field(default_factory=list)
     events: list[CoarseningEvent] = field(default_factory=list)
     noted: tuple[int, int] = (0, 0)
     fault: str = ""
@@ -88,6 +91,9 @@ def coarsen(
     volumes follow `gas_flow`, dV_i/dt = −κ Σ (p_i − p_j) A_ij. A bubble below ``vanish`` mean volumes goes
     (T2): its films meet, its gas is its neighbours'.
 
+    An open cluster loses gas to its exterior, or takes all of it: the run ends where ``vanish`` of the one or
+    the other is left.
+
     Volumes are stepped by Adams and Bashforth's second-order formula (Euler's after a change of topology),
     and the difference from the trapezoidal rule sets the step. Since rates hardly change but when films turn
     (by von Neumann's law not at all on flat plates), it is T1s within a step that make the error: it is of
@@ -96,13 +102,14 @@ def coarsen(
     Parameters
     ----------
     foam : Foam
-        Relaxed first.
+        Relaxed first; what is smaller than ``vanish`` goes before the first frame.
     permeability : float, optional
         κ, volume per time, film area and pressure.
     duration : float, optional
         Time to cover. Mean area / κγ is the time in which bubbles come and go.
     until : int, optional
         End when no more bubbles than this are left, an exterior not counted. Give this, a duration, or both.
+        Without a duration a foam in balance, where no gas flows, ends the run too.
     every : float, optional
         Time between frames; by default a fiftieth of the duration, or a fifth of the first mean area / κγ.
     tolerance : float, optional
@@ -117,7 +124,8 @@ def coarsen(
         HDF5 file (``.h5``) that takes each frame when it is reached; needs h5py.
     resume : bool, optional
         Go on with the frames in ``trajectory``, if there are any: the same foam and options are needed, but
-        for duration and until. A run that was killed and resumed makes the same frames bit for bit.
+        for duration and until; ``every`` is the file's if it is left out. A run that was killed and resumed
+        makes the same frames bit for bit.
     progress : callable, optional
         Called as ``progress("coarsen", fraction)`` after each step.
 
@@ -176,7 +184,7 @@ def coarsen(
     if path is None:
         return _coarsened(run, span, few, None, report)
     if going_on and path.exists():
-        _recall(run, path)
+        _recall(run, path, usual=every is None)
     else:
         new_trajectory(path, lambda writer: _write_frame(run, writer, {"options": asdict(options)}))
     with TrajectoryWriter(path, append=True) as writer:
@@ -192,8 +200,9 @@ def _begun(foam: Foam, options: _Options, unit: float) -> _Run:
     if not found.converged:
         raise ValueError(f"foam does not relax, so that its pressures are unknown: {found.message}")
     start = found.foam
-    run = _Run(options, start, gas_flow(start, permeability=options.permeability))
+    run = _Run(options, unit, start, gas_flow(start, permeability=options.permeability))
     run.step = options.step or FIRST * unit
+    _let_vanish(run)
     _log(run, 0.0)
     _keep_frame(run)
     return run
@@ -201,7 +210,11 @@ def _begun(foam: Foam, options: _Options, unit: float) -> _Run:
 
 def _log(run: _Run, error: float) -> None:
     sides = _held(run.foam, run.foam.network.sides.astype(np.float64))
-    run.log.append((run.time, run.foam.energy, len(sides), float(sides.var()), error))
+    surface = run.foam.cell.surface
+    area = surface.area / len(sides)
+    if run.foam.exterior is not None:
+        area = float(_held(run.foam, run.foam.bubble_areas).mean())
+    run.log.append((run.time, run.foam.energy, len(sides), float(sides.var()), error, area))
 
 
 def _keep_frame(run: _Run) -> None:
@@ -225,27 +238,30 @@ def _write_frame(run: _Run, writer: TrajectoryWriter, more: dict[str, Any]) -> N
     writer.append(run.foams[-1], time=run.times[-1], notes={"coarsening": notes})
 
 
-def _recall(run: _Run, path: Path) -> None:
-    """Take up the run in a trajectory, if it is this one."""
+def _recall(run: _Run, path: Path, *, usual: bool) -> None:
+    """Take up the run in a trajectory, if it is this one; as ``usual`` with its time between frames."""
     with Trajectory(path) as frames:
         notes = [frames.notes(k).get("coarsening") for k in range(len(frames))]
         if not notes or not all(isinstance(note, dict) for note in notes):
             raise ValueError(f"{path} holds no coarsening; use another file")
         foams, times = list(frames), frames.times.tolist()
     kept = [dict(note) for note in notes if note is not None]
-    mine, theirs = asdict(run.options), kept[0]["options"]
+    theirs = kept[0]["options"]
+    if usual:
+        run.options = replace(run.options, every=theirs["every"])
+    mine = asdict(run.options)
     other = [name for name in mine if mine[name] != theirs.get(name)]
     if other:
         raise ValueError(f"{path} holds a coarsening with another {', '.join(other)}; use another file")
     same = all(
         np.array_equal(getattr(run.foam, name), getattr(foams[0], name))
-        for name in ("vertex_points", "film_offsets", "target_volumes")
+        for name in ("vertex_points", "film_offsets", "target_volumes", "bubble_ids", "tension")
     )
     if not same or foams[0].cell != run.foam.cell:
         raise ValueError(f"{path} holds the coarsening of another foam; use another file")
     run.foams, run.times, run.log, run.events = foams, times, [], []
     for note in kept:
-        run.log += [(row[0], row[1], row[2], row[3], row[4]) for row in note["log"]]
+        run.log += [(row[0], row[1], row[2], row[3], row[4], row[5]) for row in note["log"]]
         run.events += [CoarseningEvent.from_record(entry) for entry in note["events"]]
     last = kept[-1]
     run.foam, run.time, run.step = foams[-1], times[-1], last["step"]
@@ -260,6 +276,9 @@ def _coarsened(
     end = np.inf if duration is None else duration
     first = run.log[0][2]
     while run.time < end and len(run.held) > until and not run.fault:
+        if end == np.inf and np.abs(run.rate).max() * run.unit < STILL * run.held.mean():
+            run.fault = f"stopped: no gas flows at time {run.time:.6g}, the foam is in balance"
+            break
         # frames are counted, not added up
         number = int(np.floor(run.time / run.options.every * (1.0 + 1e-12))) + 1
         target = min(number * run.options.every, end)
@@ -287,6 +306,7 @@ def _coarsened(
         step_bubbles=frozen(np.array(columns[2], dtype=np.int64)),
         step_mu2=frozen(np.array(columns[3], dtype=np.float64)),
         step_errors=frozen(np.array(columns[4], dtype=np.float64)),
+        step_mean_areas=frozen(np.array(columns[5], dtype=np.float64)),
         n_rejected=run.rejected,
         completed=not run.fault,
         message=run.fault or ended,
@@ -296,24 +316,31 @@ def _coarsened(
 def _step(run: _Run, target: float) -> None:
     """One step that is kept, at most to ``target``; shorter and shorter ones are tried."""
     options, foam = run.options, run.foam
-    held, flow = run.held, _held(foam, run.rate)
-    mean = float(held.mean())
-    least = LEAST * mean / max(float(np.abs(flow).max()), 1e-300)
+    mean = float(run.held.mean())
+    # a foam in balance has no flow to measure time by
+    least = LEAST * min(mean / max(float(np.abs(run.rate).max()), 1e-300), run.unit)
     small = BELOW * options.vanish * mean
-    shrinking = flow < 0.0
-    room = float(((held - small)[shrinking] / -flow[shrinking]).min(initial=np.inf))
-    left, fault = target - run.time, ""
+    shrinking = run.rate < 0.0
+    room = float(((foam.target_volumes - small)[shrinking] / -run.rate[shrinking]).min(initial=np.inf))
+    lost = -float(_held(foam, run.rate).sum())
+    if foam.exterior is not None and lost > 0.0:
+        # a cluster shrinks as a whole, by half at most: its films have as far to go
+        room = min(room, 0.5 * float(run.held.sum()) / lost)
+    left, fault, rejected = target - run.time, "", run.rejected
     wanted = run.step if options.step is None else options.step
     while True:
         time = min(wanted, room, left)
-        if time < least:
+        if left - time < least and run.rejected == rejected:
+            # what would be left is no step, nor is it a failure if the whole way is none
+            time = left
+        elif time < least:
             run.fault = f"stopped: steps became too short at time {run.time:.6g} ({fault or 'tolerance'})"
             return
         speed = run.rate
         if run.past is not None:
             speed = speed + 0.5 * time / run.past[0] * (run.rate - run.past[1])
         targets = foam.target_volumes + time * speed
-        if not _held(foam, targets).min() > 0.5 * small:
+        if not targets.min() > 0.5 * small:
             wanted, fault = FAILED * time, "a bubble vanishes too fast"
             run.rejected += 1
             continue
@@ -364,8 +391,13 @@ def _booked(run: _Run, found: Relaxation) -> bool:
 
 
 def _let_vanish(run: _Run) -> None:
-    """T2s on all bubbles that are too small, smallest first."""
-    foam = run.foam
+    """T2s on all bubbles that are too small, smallest first; all of them are kept or none."""
+    foam, gone = run.foam, list[CoarseningEvent]()
+    start = run.foams[0] if run.foams else foam
+    if run.held.sum() < run.options.vanish * _held(start, start.target_volumes).sum():
+        # mean volumes shrink with a cluster: none of its bubbles need ever be small beside them
+        run.fault = f"stopped: the cluster has given away its gas at time {run.time:.6g}"
+        return
     while True:
         held = foam.target_volumes.copy()
         mean = float(_held(foam, held).mean())
@@ -374,6 +406,9 @@ def _let_vanish(run: _Run) -> None:
         bubble = int(held.argmin())
         if held[bubble] >= run.options.vanish * mean:
             break
+        if foam.n_bubbles == 2:
+            run.fault = f"stopped: the last bubble but one is about to vanish at time {run.time:.6g}"
+            return
         x, y, z = foam.bubble_centres[bubble].tolist()
         name = int(foam.bubble_ids[bubble])
         try:
@@ -381,13 +416,17 @@ def _let_vanish(run: _Run) -> None:
         except TopologyError as fault:
             run.fault = f"stopped: bubble {name} is about to vanish at time {run.time:.6g}, but {fault}"
             return
-        run.events.append(CoarseningEvent(run.time, run.count, "t2", (name,), (), (x, y, z)))
+        gone.append(CoarseningEvent(run.time, run.count, "t2", (name,), (), (x, y, z)))
+    if foam.exterior is not None and foam.target_volumes[foam.exterior] < run.options.vanish * mean:
+        run.fault = f"stopped: the cluster has left no room for its exterior at time {run.time:.6g}"
+        return
     if foam is run.foam:
         return
     found = _relaxed(foam, foam.target_volumes, STEPS_AFTER)
     if not found.converged:
         run.fault = f"stopped: the foam did not relax after a T2 at time {run.time:.6g}: {found.message}"
         return
+    run.events += gone
     _booked(run, found)
     run.past = None
     run.foam = found.foam

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
-from warpedfoam.arrays import Floats, Ints, frozen
+from warpedfoam.arrays import Floats, Ints
 from warpedfoam.foam import Foam
 
 
@@ -59,6 +58,8 @@ class Coarsening:
         start included.
     step_errors : (m,) array
         Estimated error of each step, in mean volumes.
+    step_mean_areas : (m,) array
+        Area of the inner plate per bubble after each step, without an exterior.
     n_rejected : int
         Steps that were tried and taken back.
     completed : bool
@@ -75,6 +76,7 @@ class Coarsening:
     step_bubbles: Ints
     step_mu2: Floats
     step_errors: Floats
+    step_mean_areas: Floats
     n_rejected: int
     completed: bool
     message: str
@@ -102,8 +104,3 @@ class Coarsening:
     def n_t2(self) -> int:
         """How many bubbles have vanished."""
         return self.n_events("t2")
-
-    @cached_property
-    def step_mean_areas(self) -> Floats:
-        """Area of the inner plate per bubble after each step, (m,); of an open cluster, see the frames."""
-        return frozen(self.foams[0].cell.surface.area / self.step_bubbles)

@@ -93,6 +93,8 @@ def rewire_t2(network: CellNetwork, bubble: int) -> tuple[CellNetwork, Ints, Int
 
 #: Two films become one if they are not longer together, in bubble sizes: a marker stays on half a turn.
 MERGED = 1.5
+#: Lengths of turned films that are tried, in those of the old.
+SHARES = (1.0, 0.5, 0.25, 0.1)
 #: Films' corners inside and walls of bubbles that can vanish.
 VANISHING = frozenset({(3, 0), (2, 0), (0, 0), (1, 1), (0, 1)})
 
@@ -125,7 +127,7 @@ def t2(foam: Foam, bubble: int) -> Foam:
     TypeError, ValueError
         If there is no such bubble, or it is the exterior.
     TopologyError
-        If it cannot vanish (see `rewire_t2`).
+        If it cannot vanish (see `rewire_t2`), or is so large that what is left of the films is no foam.
 
     Examples
     --------
@@ -157,16 +159,21 @@ def t2(foam: Foam, bubble: int) -> Foam:
             if shed.film_lengths[beside].sum() < MERGED * foam.bubble_size:
                 layout, _ = merge(surface, layout, merged)
     exterior = foam.exterior
-    return replace(
-        foam,
-        network=layout.network,
-        vertex_points=layout.points,
-        film_offsets=layout.offsets,
-        target_volumes=targets,
-        bubble_ids=np.delete(foam.bubble_ids, chosen),
-        pressures=None if pressures is None else np.delete(pressures, chosen),
-        exterior=None if exterior is None else exterior - (chosen < exterior),
-    )
+    try:
+        return replace(
+            foam,
+            network=layout.network,
+            vertex_points=layout.points,
+            film_offsets=layout.offsets,
+            target_volumes=targets,
+            bubble_ids=np.delete(foam.bubble_ids, chosen),
+            pressures=None if pressures is None else np.delete(pressures, chosen),
+            exterior=None if exterior is None else exterior - (chosen < exterior),
+        )
+    except ValueError as fault:
+        raise TopologyError(
+            f"without bubble {chosen} there is no foam ({fault}); let it shrink first"
+        ) from fault
 
 
 def _shared_out(foam: Foam, bubble: int) -> Floats:
@@ -196,7 +203,21 @@ def _without_sides(foam: Foam, bubble: int) -> Foam:
                 f"bubble {bubble} has {_sides(network, bubble)} and cannot vanish: none of them may turn"
             )
         film = int(films[np.argmin(foam.film_lengths[films])])
-        foam = t1(foam, film, length=min(float(foam.film_lengths[film]), foam.bubble_size))
+        foam = _turned(foam, film, bubble)
+
+
+def _turned(foam: Foam, film: int, bubble: int) -> Foam:
+    """After a T1, the new film shorter where it would not lie on the surface."""
+    length = min(float(foam.film_lengths[film]), foam.bubble_size)
+    for share in SHARES:
+        try:
+            return t1(foam, film, length=share * length)
+        except ValueError as error:
+            fault = error
+    raise TopologyError(
+        f"bubble {bubble} is too large to vanish where it is: without its film {film} there is no foam "
+        f"({fault}); let it shrink first"
+    ) from fault
 
 
 def _may_turn(network: CellNetwork, films: Ints) -> Bools:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,8 @@ EQUAL = 1e-9
 def plot_sides(statistics: FoamStatistics, *, width: float | None = None) -> Figure:
     """Histogram of sides with μ₂; mean sides of neighbours; mean areas: the laws of Aboav–Weaire and Lewis.
 
+    Bars have the colours of charges 6 − n. Bubbles at walls have others, and are grey.
+
     Parameters
     ----------
     statistics : FoamStatistics
@@ -36,8 +38,15 @@ def plot_sides(statistics: FoamStatistics, *, width: float | None = None) -> Fig
     style = Style.of(width, 3 * PANEL)
     figure, (left, middle, right) = style.panels(3)
     rgb = charge_rgb((6 - s.sides).astype(np.float64)) / 255.0
-    left.bar(s.sides, s.fractions, color=rgb, edgecolor="#333333", linewidth=0.6)
-    style.dress(left, "sides n", "fraction of bubbles P(n)", f"{s.n_bubbles} bubbles, μ₂ = {s.mu2:.3f}")
+    # colours are charges 6 − n, which bubbles at walls do not have
+    walled = s.at_walls / s.n_bubbles
+    edge: dict[str, Any] = {"edgecolor": "#333333", "linewidth": 0.6}
+    left.bar(s.sides, s.fractions - walled, color=rgb, **edge)
+    title = f"{s.n_bubbles} bubbles, μ₂ = {s.mu2:.3f}"
+    if walled.any():
+        left.bar(s.sides, walled, bottom=s.fractions - walled, color=GREY, **edge)
+        title += f"; grey: {s.at_walls.sum()} at walls"
+    style.dress(left, "sides n", "fraction of bubbles P(n)", title)
     middle.plot(s.sides, s.sides * s.neighbour_sides, "o", color=BLUE, label="measured")
     if s.aboav is not None:
         law = (s.mean_sides - s.aboav) * s.sides + s.mean_sides * s.aboav + s.mu2
