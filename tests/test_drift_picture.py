@@ -37,6 +37,18 @@ def test_the_picture_shows_frames_and_energy(moved: wf.Drift, tmp_path: Path) ->
     assert wf.save_figure(tmp_path / "drift.png", figure).stat().st_size > 10_000
 
 
+def test_round_off_is_no_fall() -> None:
+    """A raw start that stays where it is: its first fall is shown whole, and at rest the line is flat."""
+    cell = wf.HeleShawCell(wf.Sphere(1.0), 0.01)
+    raw = wf.cluster_foam(cell, 1, volumes=0.01)
+    still = wf.drift(raw, duration=4.0, every=1.0)
+    low, high = wf.plot_drift(still).axes[-1].get_ylim()
+    assert low < still.step_energies[-1] < still.step_energies[0] < high
+    rest = wf.drift(still.foam, duration=4.0, every=1.0)
+    low, high = wf.plot_drift(rest).axes[-1].get_ylim()
+    assert (high - low) / abs(high) == pytest.approx(2e-7, rel=1e-3)
+
+
 def test_a_drift_on_a_column(moved: wf.Drift) -> None:
     figure = wf.plot_drift(moved, width=86.0, title="down")
     check_readable(figure, 86.0)

@@ -33,6 +33,8 @@ ENDINGS, MOST_FRAMES = (".gif", ".mp4"), 2000
 MARGIN, WHOLE = 0.15, 0.7
 #: A first fall so many times as great as all that follows is cut off.
 STEEP = 3.0
+#: Energies that differ by less than this share are the same to a reader.
+STILL = 1e-7
 #: Frames in the picture of a drift whose choice is left to it.
 SHOWN = 4
 
@@ -313,9 +315,14 @@ def _energy_axes(axes: Axes, drift: Drift, style: Style) -> None:
 
 def _label(axes: Any, energies: Floats, small: float = 9.0) -> None:
     """Names of the axes; the fall in which a raw start finds its shape is cut off, and said so."""
+    middle = 0.5 * float(energies.max() + energies.min())
+    if float(np.ptp(energies)) < STILL * abs(middle):
+        # at rest: not a mountain of round-off
+        axes.set_ylim(middle * (1.0 - STILL), middle * (1.0 + STILL))
     if len(energies) > 3:
         low, high = float(energies.min()), float(energies[1:].max())
-        if energies[0] - high > STEEP * (high - low) > 0.0:
+        # what is left must be more than round-off
+        if energies[0] - high > STEEP * (high - low) > STEEP * STILL * abs(high):
             room = 0.1 * (high - low)
             axes.set_ylim(low - room, high + room)
             axes.annotate(
